@@ -8,3 +8,12 @@
 //! The tracer knows no window, no user interface and no headset; whoever has those makes the device.
 
 pub mod scene;
+pub mod bvh;
+pub mod distribution;
+pub mod features;
+pub mod film;
+pub mod gpu;
+pub mod kernels;
+pub mod renderer;
+pub mod upload;
+pub mod view;

@@ -1,0 +1,113 @@
+//! Two-level bounding volume hierarchy: one obvhs CWBVH per mesh, one over the instances.
+
+use glam::{Affine3A, Vec3A};
+use obvhs::{
+    BvhBuildParams,
+    aabb::Aabb,
+    cwbvh::{CwBvh, builder::build_cwbvh, node::CwBvhNode},
+    triangle::Triangle,
+};
+use rayon::prelude::*;
+
+use crate::scene::{Mesh, Scene};
+
+/// Bytes of a node on the GPU.
+pub const NODE_BYTES: usize = size_of::<CwBvhNode>();
+
+/// The hierarchy of one mesh: its nodes, and its triangles in the order of the leaves.
+#[derive(Debug)]
+pub struct Blas {
+    /// Indices of children and primitives count from zero.
+    pub nodes: Vec<CwBvhNode>,
+    /// Leaf order to index in [`Mesh::triangles`].
+    pub triangle_order: Vec<u32>,
+    /// Bounds in mesh space.
+    pub bounds: Aabb,
+    /// Levels of nodes, at least 1.
+    pub depth: u32,
+}
+
+/// The hierarchy over the visible instances.
+#[derive(Debug)]
+pub struct Tlas {
+    /// Indices of children and primitives count from zero.
+    pub nodes: Vec<CwBvhNode>,
+    /// Leaf order to index in [`Scene::instances`].
+    pub instance_order: Vec<u32>,
+    /// Levels of nodes, at least 1.
+    pub depth: u32,
+}
+
+impl Blas {
+    /// Builds the hierarchy of a mesh. Triangles are not split, so each appears once.
+    pub fn build(mesh: &Mesh) -> Self {
+        let triangles: Vec<Triangle> = mesh
+            .triangles
+            .iter()
+            .map(|corners| {
+                let [v0, v1, v2] = corners.map(|i| Vec3A::from(mesh.positions[i as usize]));
+                Triangle { v0, v1, v2 }
+            })
+            .collect();
+        let bvh = build_cwbvh(&triangles, build_params(), &mut std::time::Duration::default());
+        Self { bounds: bvh.total_aabb, depth: depth(&bvh), nodes: bvh.nodes, triangle_order: bvh.primitive_indices }
+    }
+}
+
+impl Tlas {
+    /// Builds the hierarchy over the visible instances; `blas` has one entry per mesh of the scene.
+    pub fn build(scene: &Scene, blas: &[std::sync::Arc<Blas>]) -> Self {
+        let visible: Vec<u32> =
+            (0..scene.instances.len() as u32).filter(|&i| scene.instances[i as usize].visible).collect();
+        if visible.is_empty() {
+            return Self { nodes: vec![CwBvhNode::default()], instance_order: Vec::new(), depth: 1 };
+        }
+        let bounds: Vec<Aabb> = visible
+            .par_iter()
+            .map(|&i| {
+                let instance = &scene.instances[i as usize];
+                transformed_bounds(&blas[instance.mesh as usize].bounds, &instance.world_from_mesh)
+            })
+            .collect();
+        let bvh = build_cwbvh(&bounds, build_params(), &mut std::time::Duration::default());
+        let instance_order = bvh.primitive_indices.iter().map(|&i| visible[i as usize]).collect();
+        Self { depth: depth(&bvh), nodes: bvh.nodes, instance_order }
+    }
+}
+
+/// Bounds of a transformed box, widened by the rounding of the transform in f32.
+pub fn transformed_bounds(bounds: &Aabb, world_from_mesh: &Affine3A) -> Aabb {
+    let centre = (bounds.min + bounds.max) * 0.5;
+    let half = (bounds.max - bounds.min) * 0.5;
+    let m = world_from_mesh.matrix3;
+    let new_half = m.x_axis.abs() * half.x + m.y_axis.abs() * half.y + m.z_axis.abs() * half.z;
+    let new_centre = world_from_mesh.transform_point3a(centre);
+    let slack = (new_centre.abs() + new_half + world_from_mesh.translation.abs()) * 1e-6;
+    Aabb::new(new_centre - new_half - slack, new_centre + new_half + slack)
+}
+
+/// Good traversal for a moderate build time; no spatial splits, because lights refer to triangles by leaf order.
+const fn build_params() -> BvhBuildParams {
+    BvhBuildParams { pre_split: false, max_prims_per_leaf: 3, ..BvhBuildParams::medium_build() }
+}
+
+fn depth(bvh: &CwBvh) -> u32 {
+    let mut deepest = 1;
+    let mut pending = vec![(0, 1)];
+    while let Some((index, level)) = pending.pop() {
+        let Some(node) = bvh.nodes.get(index as usize) else { continue };
+        deepest = deepest.max(level);
+        let children = node.imask.count_ones();
+        pending.extend((0..children).map(|child| (node.child_base_idx + child, level + 1)));
+    }
+    deepest
+}
+
+/// Shifts a hierarchy's indices so that it can stand among others in one buffer.
+pub fn rebased(nodes: &[CwBvhNode], node_base: u32, primitive_base: u32) -> impl Iterator<Item = CwBvhNode> {
+    nodes.iter().map(move |node| CwBvhNode {
+        child_base_idx: node.child_base_idx + node_base,
+        primitive_base_idx: node.primitive_base_idx + primitive_base,
+        ..*node
+    })
+}

@@ -1,0 +1,272 @@
+//! How samples are spread over the film: a mixture of layers, each of which chooses film pixels.
+//!
+//! The density chooses the pixel; the position inside it is drawn afresh and uniform, so every distribution converges
+//! to the same value in every pixel that it gives density to.
+
+use std::sync::Arc;
+
+use fovea_sampler::inverse::Inverse;
+use glam::{Mat3, Quat, Vec2, Vec3};
+use rayon::prelude::*;
+
+use crate::{
+    film::{FilmMapping, FilmOptions},
+    kernels::layout::{self, MAX_LAYERS, SampleLayer, codes},
+};
+
+/// Candidates drawn before a clipped layer accepts one outside.
+const CLIP_TRIES: u32 = 16;
+
+/// A perspective view: where it looks and what its image plane spans.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// World from view; the view looks along -Z, +Y is up.
+    pub world_from_view: Quat,
+    /// tan of half the horizontal and vertical angles of view.
+    pub half_extent: Vec2,
+}
+
+impl View {
+    /// A view with these full angles in radians, each below pi.
+    pub fn new(world_from_view: Quat, hfov: f32, vfov: f32) -> Self {
+        Self { world_from_view, half_extent: Vec2::new((hfov * 0.5).tan(), (vfov * 0.5).tan()) }
+    }
+
+    /// Unit direction in the world of a point of the image plane in -1..1 (x right, y up).
+    pub fn direction(&self, point: Vec2) -> Vec3 {
+        self.world_from_view * (point * self.half_extent).extend(-1.0).normalize()
+    }
+
+    /// Point of the image plane in units of its half extents, for a direction in front of the view.
+    pub fn project(&self, direction: Vec3) -> Option<Vec2> {
+        let d = self.world_from_view.inverse() * direction;
+        (d.z < -1e-6).then(|| d.truncate() / -d.z / self.half_extent)
+    }
+}
+
+/// Where the eye looks, and where eccentricity is measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Gaze {
+    /// A direction in the world; eccentricity is the angle in the scene.
+    Scene {
+        /// Unit vector.
+        direction: Vec3,
+    },
+    /// A point on a flat screen that shows a view; eccentricity is the angle at the eye in front of its centre.
+    Eye {
+        /// Gaze in units of the screen's half width and half height, y up.
+        on_screen: Vec2,
+        /// Half width and half height of the view on the screen, over the viewing distance.
+        screen_half_extent: Vec2,
+        /// What the screen shows.
+        view: View,
+    },
+}
+
+/// Keeps most samples of a layer inside a view.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clip {
+    /// The view.
+    pub view: View,
+    /// How much farther than the view's edge samples may fall, as a fraction of its half extent.
+    pub margin: f32,
+    /// Share of samples that ignore the clip, in 0..=1.
+    pub unclipped_share: f32,
+}
+
+/// One component of a mixture.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Layer {
+    /// Uniform over the film's pixels.
+    Film,
+    /// Uniform over directions.
+    Sphere,
+    /// Uniform over the image plane of a view.
+    ImagePlane(View),
+    /// Uniform over a list of film pixels.
+    Pixels(Arc<[u32]>),
+    /// By visual acuity about the gaze.
+    Acuity {
+        /// Where the eye looks.
+        gaze: Gaze,
+        /// Keep to a view.
+        clip: Option<View>,
+        /// Part of the radial inverse's range to use, in 0..=1: below 1 leaves its floor out.
+        radius_scale: f32,
+    },
+}
+
+/// A mixture of layers by weight, with the radial inverse that its acuity layers use.
+#[derive(Clone, Debug)]
+pub struct Distribution {
+    layers: Vec<(f32, Layer)>,
+    inverse: Arc<Inverse>,
+}
+
+impl Distribution {
+    /// Omnidirectional (OD): uniform over the film's pixels.
+    pub fn omnidirectional(inverse: Arc<Inverse>) -> Self {
+        Self { layers: vec![(1.0, Layer::Film)], inverse }
+    }
+
+    /// Viewport (VP): uniform over the image plane of a view.
+    pub fn viewport(view: View, inverse: Arc<Inverse>) -> Self {
+        Self { layers: vec![(1.0, Layer::ImagePlane(view))], inverse }
+    }
+
+    /// Uniform over the film pixels whose centre is inside a view, as a rectangle-selection tool does.
+    pub fn region(view: View, film: &FilmOptions, world_from_film: Quat, inverse: Arc<Inverse>) -> Self {
+        Self { layers: vec![(1.0, Layer::Pixels(pixels_in_view(film, world_from_film, &view)))], inverse }
+    }
+
+    /// Foveated (FV): by visual acuity about the gaze.
+    pub fn foveated(gaze: Gaze, clip: Option<Clip>, inverse: Arc<Inverse>) -> Self {
+        let distribution = inverse.distribution();
+        let capped = distribution.map_or(1.0, |d| 1.0 / (1.0 + d.outer_ratio()));
+        let mut layers = Vec::new();
+        let mut push = |weight: f64, view: Option<View>| {
+            if weight <= 0.0 {
+                return;
+            }
+            match gaze {
+                Gaze::Scene { .. } => {
+                    layers.push((weight as f32, Layer::Acuity { gaze, clip: view, radius_scale: 1.0 }));
+                }
+                // The floor stays in scene directions, so it is a layer of its own.
+                Gaze::Eye { .. } => {
+                    let radius_scale = capped as f32;
+                    layers.push(((weight * capped) as f32, Layer::Acuity { gaze, clip: view, radius_scale }));
+                    if capped < 1.0 {
+                        layers.push(((weight * (1.0 - capped)) as f32, Layer::Sphere));
+                    }
+                }
+            }
+        };
+        match clip {
+            None => push(1.0, None),
+            Some(clip) => {
+                let widened = View { half_extent: clip.view.half_extent * (1.0 + clip.margin), ..clip.view };
+                push(f64::from(1.0 - clip.unclipped_share), Some(widened));
+                push(f64::from(clip.unclipped_share), None);
+            }
+        }
+        Self { layers, inverse }
+    }
+
+    /// A mixture by weights, which need not sum to one. `None` when there is no layer with a positive weight, or more
+    /// than the kernels hold.
+    pub fn mixture(layers: Vec<(f32, Layer)>, inverse: Arc<Inverse>) -> Option<Self> {
+        let layers: Vec<_> = layers.into_iter().filter(|(weight, _)| *weight > 0.0).collect();
+        (1..=MAX_LAYERS).contains(&layers.len()).then_some(Self { layers, inverse })
+    }
+
+    /// The mixture's layers with their weights.
+    pub fn layers(&self) -> &[(f32, Layer)] {
+        &self.layers
+    }
+
+    /// The radial inverse of the acuity layers.
+    pub fn inverse(&self) -> &Arc<Inverse> {
+        &self.inverse
+    }
+
+    /// The mixture as the kernels consume it: layers, their number, and the pixel list.
+    pub(crate) fn encode(&self) -> ([SampleLayer; MAX_LAYERS], u32, Vec<u32>) {
+        let sum: f32 = self.layers.iter().map(|(weight, _)| weight).sum();
+        let mut encoded = [bytemuck::Zeroable::zeroed(); MAX_LAYERS];
+        let mut pixels = Vec::new();
+        let mut cumulative = 0.0;
+        for ((weight, layer), out) in self.layers.iter().zip(&mut encoded) {
+            let share = weight / sum;
+            cumulative += share;
+            *out = encode_layer(layer, &mut pixels);
+            out.share = share;
+            out.cumulative = cumulative;
+        }
+        (encoded, self.layers.len().min(MAX_LAYERS) as u32, pixels)
+    }
+}
+
+fn encode_layer(layer: &Layer, pixels: &mut Vec<u32>) -> SampleLayer {
+    let mut out: SampleLayer = bytemuck::Zeroable::zeroed();
+    out.clip_tries = 1;
+    match layer {
+        Layer::Film => out.kind = codes::LAYER_FILM,
+        Layer::Sphere => out.kind = codes::LAYER_SPHERE,
+        Layer::ImagePlane(view) => {
+            out.kind = codes::LAYER_IMAGE_PLANE;
+            out.world_from_layer = layout::columns(Mat3::from_quat(view.world_from_view));
+            out.view_half_extent = view.half_extent.to_array();
+        }
+        Layer::Pixels(list) => {
+            out.kind = codes::LAYER_PIXEL_LIST;
+            out.list_first = pixels.len() as u32;
+            out.list_count = list.len() as u32;
+            pixels.extend_from_slice(list);
+        }
+        Layer::Acuity { gaze, clip, radius_scale } => {
+            out.radius_scale = *radius_scale;
+            match gaze {
+                Gaze::Scene { direction } => {
+                    out.kind = codes::LAYER_GAZE;
+                    out.world_from_layer = layout::columns(gaze_frame(*direction));
+                }
+                Gaze::Eye { on_screen, screen_half_extent, view } => {
+                    out.kind = codes::LAYER_GAZE_AT_EYE;
+                    let eye = (*on_screen * *screen_half_extent).extend(-1.0).normalize();
+                    out.screen_from_gaze = layout::columns(gaze_frame(eye));
+                    out.screen_half_extent = screen_half_extent.to_array();
+                    out.world_from_layer = layout::columns(Mat3::from_quat(view.world_from_view));
+                    out.view_half_extent = view.half_extent.to_array();
+                }
+            }
+            if let Some(view) = clip {
+                out.clip_tries = CLIP_TRIES;
+                out.clip_half_extent = view.half_extent.to_array();
+                out.world_from_clip = layout::columns(Mat3::from_quat(view.world_from_view));
+            }
+        }
+    }
+    out
+}
+
+/// Orthonormal frame with +Z along `n` (Duff et al. 2017).
+pub fn gaze_frame(n: Vec3) -> Mat3 {
+    let sign = 1.0_f32.copysign(n.z);
+    let a = -1.0 / (sign + n.z);
+    let b = n.x * n.y * a;
+    Mat3::from_cols(
+        Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x),
+        Vec3::new(b, sign + n.y * n.y * a, -n.y),
+        n,
+    )
+}
+
+/// Film pixels whose centre is inside a view; all pixels when none is.
+fn pixels_in_view(film: &FilmOptions, world_from_film: Quat, view: &View) -> Arc<[u32]> {
+    let inside = |index: u32| {
+        let d = world_from_film * film_direction(film, index % film.width, index / film.width);
+        view.project(d).is_some_and(|p| p.abs().max_element() <= 1.0)
+    };
+    let list: Vec<u32> = (0..film.pixels() as u32).into_par_iter().filter(|&index| inside(index)).collect();
+    if list.is_empty() { (0..film.pixels() as u32).collect() } else { list.into() }
+}
+
+/// Direction, in the film's frame, of a pixel's centre.
+pub fn film_direction(film: &FilmOptions, x: u32, y: u32) -> Vec3 {
+    let u = (f64::from(x) + 0.5) / f64::from(film.width);
+    let v = (f64::from(y) + 0.5) / f64::from(film.height);
+    match film.mapping {
+        FilmMapping::Equirect => {
+            let (sin_lon, cos_lon) = (std::f64::consts::TAU * (u - 0.5)).sin_cos();
+            let (sin_lat, cos_lat) = (std::f64::consts::PI * (0.5 - v)).sin_cos();
+            glam::DVec3::new(cos_lat * sin_lon, sin_lat, -cos_lat * cos_lon).as_vec3()
+        }
+        FilmMapping::Perspective { half_extent } => Vec3::new(
+            (2.0 * u - 1.0) as f32 * half_extent[0],
+            (1.0 - 2.0 * v) as f32 * half_extent[1],
+            -1.0,
+        )
+        .normalize(),
+    }
+}

@@ -1,0 +1,129 @@
+//! What a scene needs of a kernel, computed from the scene's data.
+
+use std::fmt;
+
+use crate::scene::{AlphaMode, Environment, Material, Scene};
+
+macro_rules! features {
+    ($($(#[$doc:meta])* $variant:ident = $name:literal,)*) => {
+        /// A compile-time flag of the shaders. A kernel contains only what the scene needs.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        #[repr(u32)]
+        pub enum Feature { $($(#[$doc])* $variant,)* }
+
+        impl Feature {
+            /// Every flag, in the order of their bits.
+            pub const ALL: &[Self] = &[$(Self::$variant,)*];
+
+            /// The flag's name in the shaders' `@if`.
+            pub const fn name(self) -> &'static str {
+                match self { $(Self::$variant => $name,)* }
+            }
+        }
+    };
+}
+
+features! {
+    /// Some instance has alpha mask or blend: candidates pass an alpha test.
+    Alpha = "ALPHA",
+    /// Some material has a texture.
+    Textures = "TEXTURES",
+    /// Some material has a normal map.
+    NormalMaps = "NORMAL_MAPS",
+    /// Some material has a texture of KHR_materials_specular.
+    SpecularTextures = "SPECULAR_TEXTURES",
+    /// Some material emits.
+    Emission = "EMISSION",
+    /// There are emissive triangles or punctual lights to sample.
+    Lights = "LIGHTS",
+    /// The environment is an image and is sampled; a constant one is left to BSDF sampling.
+    EnvironmentImage = "ENVIRONMENT_IMAGE",
+    /// Some material transmits light.
+    Transmission = "TRANSMISSION",
+    /// Some transmissive material is a solid that refracts.
+    Solid = "SOLID",
+    /// Some material is unlit.
+    Unlit = "UNLIT",
+    /// The film is a perspective image instead of a panorama.
+    PerspectiveFilm = "PERSPECTIVE_FILM",
+}
+
+/// A set of [`Feature`]s.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct SceneFeatures(u32);
+
+impl SceneFeatures {
+    /// The set that contains every feature.
+    pub fn all() -> Self {
+        Feature::ALL.iter().copied().collect()
+    }
+
+    /// True when the set contains the feature.
+    pub const fn contains(self, feature: Feature) -> bool {
+        self.0 & (1 << feature as u32) != 0
+    }
+
+    /// The set with the feature added when `present`.
+    #[must_use]
+    pub const fn with(self, feature: Feature, present: bool) -> Self {
+        if present { Self(self.0 | (1 << feature as u32)) } else { self }
+    }
+
+    /// What the visible part of a scene needs.
+    pub fn of(scene: &Scene) -> Self {
+        let used = used_materials(scene);
+        let any = |test: fn(&Material) -> bool| used.iter().any(|m| test(m));
+        let emits = any(|m| m.emission.max_element() > 0.0 && !m.unlit);
+        Self::default()
+            .with(Feature::Alpha, any(|m| m.alpha_mode != AlphaMode::Opaque))
+            .with(Feature::Textures, any(has_textures))
+            .with(Feature::NormalMaps, any(|m| m.normal_texture.is_some()))
+            .with(
+                Feature::SpecularTextures,
+                any(|m| m.specular_texture.is_some() || m.specular_color_texture.is_some()),
+            )
+            .with(Feature::Emission, emits)
+            .with(Feature::Lights, emits || !scene.lights.is_empty())
+            .with(Feature::EnvironmentImage, matches!(scene.environment, Environment::Image { .. }))
+            .with(Feature::Transmission, any(|m| m.transmission > 0.0))
+            .with(Feature::Solid, any(|m| m.transmission > 0.0 && m.thickness > 0.0))
+            .with(Feature::Unlit, any(|m| m.unlit))
+    }
+}
+
+impl FromIterator<Feature> for SceneFeatures {
+    fn from_iter<I: IntoIterator<Item = Feature>>(features: I) -> Self {
+        features.into_iter().fold(Self::default(), |set, feature| set.with(feature, true))
+    }
+}
+
+impl fmt::Display for SceneFeatures {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names: Vec<_> = Feature::ALL.iter().filter(|&&x| self.contains(x)).map(|x| x.name()).collect();
+        write!(f, "{}", if names.is_empty() { "plain".into() } else { names.join("+").to_lowercase() })
+    }
+}
+
+fn used_materials(scene: &Scene) -> Vec<&Material> {
+    let mut used = vec![false; scene.materials.len()];
+    for instance in scene.instances.iter().filter(|i| i.visible) {
+        if let Some(flag) = used.get_mut(instance.material as usize) {
+            *flag = true;
+        }
+    }
+    scene.materials.iter().zip(used).filter(|(_, used)| *used).map(|(material, _)| &**material).collect()
+}
+
+fn has_textures(m: &Material) -> bool {
+    [
+        m.base_color_texture,
+        m.metallic_roughness_texture,
+        m.normal_texture,
+        m.emissive_texture,
+        m.specular_texture,
+        m.specular_color_texture,
+        m.transmission_texture,
+    ]
+    .iter()
+    .any(Option::is_some)
+}

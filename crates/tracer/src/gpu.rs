@@ -1,0 +1,204 @@
+//! The device: found by the tracer when headless, handed over by whoever has a window or headset otherwise.
+
+use std::sync::Arc;
+
+use thiserror::Error;
+
+/// Why no device could be had.
+#[derive(Debug, Error)]
+pub enum GpuError {
+    /// Nothing that can compute.
+    #[error("no graphics adapter found: install a Vulkan driver (on Debian or Ubuntu: mesa-vulkan-drivers)")]
+    NoAdapter,
+    /// `WGPU_ADAPTER_NAME` or a name asked for matches nothing.
+    #[error("no graphics adapter's name contains '{wanted}'; there are: {found}")]
+    NoSuchAdapter {
+        /// What was asked for.
+        wanted: String,
+        /// Names of what is there.
+        found: String,
+    },
+    /// The adapter lacks what the tracer cannot do without.
+    #[error("adapter {adapter} cannot run the tracer: {shortfalls}")]
+    Unfit {
+        /// Its name.
+        adapter: String,
+        /// Every shortfall.
+        shortfalls: String,
+    },
+    /// The driver refused.
+    #[error("adapter {adapter} gave no device: {cause}")]
+    Device {
+        /// Its name.
+        adapter: String,
+        /// The driver's words.
+        cause: String,
+    },
+}
+
+/// Which adapter to take.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum AdapterSelect {
+    /// `WGPU_ADAPTER_NAME` if set, else a GPU, else a software adapter. `WGPU_BACKEND` restricts the backends.
+    #[default]
+    Auto,
+    /// The first whose name contains this, upper and lower case alike.
+    Named(String),
+}
+
+/// An adapter as [`Gpu::adapters`] lists it.
+#[derive(Clone, Debug)]
+pub struct AdapterDescription {
+    /// What wgpu says of it.
+    pub info: wgpu::AdapterInfo,
+    /// What it lacks; empty when the tracer runs on it.
+    pub shortfalls: Vec<String>,
+    /// True for the one that [`AdapterSelect::Auto`] takes.
+    pub is_default: bool,
+}
+
+/// A device and its queue, ready for the tracer. Cheap to clone.
+#[derive(Clone, Debug)]
+pub struct Gpu {
+    /// The adapter.
+    pub adapter: wgpu::Adapter,
+    /// The device.
+    pub device: wgpu::Device,
+    /// The queue.
+    pub queue: wgpu::Queue,
+    info: Arc<wgpu::AdapterInfo>,
+}
+
+/// Storage buffers that the largest kernel binds in one stage.
+const STORAGE_BUFFERS: u32 = 9;
+/// Smallest storage binding that the tracer works with: wgpu's default.
+const SMALLEST_BINDING: u64 = 128 << 20;
+
+impl Gpu {
+    /// Opens a device without a window.
+    ///
+    /// # Errors
+    /// When there is no adapter, none by that name, or it cannot run the tracer.
+    pub fn headless(select: &AdapterSelect) -> Result<Self, GpuError> {
+        let adapters = usable_adapters();
+        let adapter = choose(&adapters, select)?.clone();
+        let info = adapter.get_info();
+        let (required_features, required_limits) = Self::requirements(&adapter);
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("fovea"),
+            required_features,
+            required_limits,
+            ..Default::default()
+        }))
+        .map_err(|error| GpuError::Device { adapter: info.name.clone(), cause: error.to_string() })?;
+        Self::adopt(adapter, device, queue)
+    }
+
+    /// Takes over a device that somebody else made, ideally by [`Gpu::requirements`].
+    ///
+    /// # Errors
+    /// [`GpuError::Unfit`] names every shortfall of the device.
+    pub fn adopt(adapter: wgpu::Adapter, device: wgpu::Device, queue: wgpu::Queue) -> Result<Self, GpuError> {
+        let info = adapter.get_info();
+        let shortfalls = shortfalls(&device.limits());
+        if shortfalls.is_empty() {
+            Ok(Self { adapter, device, queue, info: Arc::new(info) })
+        } else {
+            Err(GpuError::Unfit { adapter: info.name, shortfalls: shortfalls.join("; ") })
+        }
+    }
+
+    /// Features and limits to ask a device for: what the tracer uses where this adapter has it.
+    pub fn requirements(adapter: &wgpu::Adapter) -> (wgpu::Features, wgpu::Limits) {
+        let wanted = wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::PIPELINE_CACHE;
+        (adapter.features() & wanted, adapter.limits())
+    }
+
+    /// Every adapter that wgpu finds.
+    pub fn adapters() -> Vec<AdapterDescription> {
+        let adapters = usable_adapters();
+        let default = choose(&adapters, &AdapterSelect::Auto).ok().map(wgpu::Adapter::get_info);
+        let mut default_seen = false;
+        adapters
+            .iter()
+            .map(|adapter| {
+                let info = adapter.get_info();
+                let is_default = !default_seen && default.as_ref() == Some(&info);
+                default_seen |= is_default;
+                AdapterDescription { shortfalls: shortfalls(&adapter.limits()), is_default, info }
+            })
+            .collect()
+    }
+
+    /// Name, driver and kind of the adapter.
+    pub fn info(&self) -> &wgpu::AdapterInfo {
+        &self.info
+    }
+
+    /// True when the adapter is a program on the CPU (lavapipe, SwiftShader, WARP).
+    pub fn is_software(&self) -> bool {
+        self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// Waits until everything submitted so far is done.
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn wait(&self) -> Result<(), wgpu::PollError> {
+        self.device.poll(wgpu::PollType::wait_indefinitely()).map(|_| ())
+    }
+
+    /// Bytes that one storage binding may have.
+    pub fn largest_binding(&self) -> u64 {
+        let limits = self.device.limits();
+        limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
+    }
+}
+
+fn usable_adapters() -> Vec<wgpu::Adapter> {
+    let descriptor = wgpu::InstanceDescriptor::new_without_display_handle().with_env();
+    let backends = descriptor.backends & (wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12);
+    pollster::block_on(wgpu::Instance::new(descriptor).enumerate_adapters(backends))
+}
+
+fn choose<'a>(adapters: &'a [wgpu::Adapter], select: &AdapterSelect) -> Result<&'a wgpu::Adapter, GpuError> {
+    let wanted = match select {
+        AdapterSelect::Auto => std::env::var("WGPU_ADAPTER_NAME").ok(),
+        AdapterSelect::Named(name) => Some(name.clone()),
+    };
+    if let Some(wanted) = wanted {
+        let lower = wanted.to_lowercase();
+        return adapters.iter().find(|a| a.get_info().name.to_lowercase().contains(&lower)).ok_or_else(|| {
+            let found = adapters.iter().map(|a| a.get_info().name).collect::<Vec<_>>().join(", ");
+            GpuError::NoSuchAdapter { wanted, found: if found.is_empty() { "none".into() } else { found } }
+        });
+    }
+    let rank = |adapter: &wgpu::Adapter| match adapter.get_info().device_type {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    };
+    adapters.iter().min_by_key(|adapter| rank(adapter)).ok_or(GpuError::NoAdapter)
+}
+
+fn shortfalls(limits: &wgpu::Limits) -> Vec<String> {
+    let mut list = Vec::new();
+    if limits.max_storage_buffers_per_shader_stage < STORAGE_BUFFERS {
+        list.push(format!(
+            "{} storage buffers a stage, {STORAGE_BUFFERS} are needed",
+            limits.max_storage_buffers_per_shader_stage
+        ));
+    }
+    if limits.max_storage_buffer_binding_size < SMALLEST_BINDING {
+        list.push(format!(
+            "storage bindings of at most {} bytes, {SMALLEST_BINDING} are needed",
+            limits.max_storage_buffer_binding_size
+        ));
+    }
+    if limits.max_compute_invocations_per_workgroup < 64 {
+        list.push("fewer than 64 compute invocations a workgroup".into());
+    }
+    list
+}

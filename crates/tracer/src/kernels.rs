@@ -1,0 +1,218 @@
+//! Kernels: WESL modules composed for a [`KernelKey`] into WGSL, and the pipelines made of them.
+
+use std::{borrow::Cow, fmt, sync::OnceLock};
+
+use fovea_sampler::{inverse::Inverse, sequence};
+use thiserror::Error;
+use wesl::{CompileOptions, ModulePath, VirtualResolver, Wesl};
+
+use crate::features::{Feature, SceneFeatures};
+
+pub mod layout;
+pub mod pipelines;
+
+/// Threads of a workgroup in every one-dimensional kernel.
+pub const WORKGROUP_SIZE: u32 = 64;
+/// Threads of a workgroup along each axis of the view kernels.
+pub const TILE_SIZE: u32 = 8;
+/// 32-bit words of a film pixel: R, G, B (64 bits each), samples, sum of squared luminance (96 bits).
+pub const FILM_WORDS: u32 = 10;
+/// Texel pages are squares of this many bits a side.
+pub const TEXEL_PAGE_BITS: u32 = 11;
+/// Russian roulette starts at this bounce.
+pub const FIRST_ROULETTE_BOUNCE: u32 = 4;
+
+/// The shader modules, by their path below `shaders/`.
+const MODULES: &[(&str, &str)] = &[
+    ("maths", include_str!("../../../shaders/maths.wesl")),
+    ("types", include_str!("../../../shaders/types.wesl")),
+    ("path_bindings", include_str!("../../../shaders/path_bindings.wesl")),
+    ("sampling::random", include_str!("../../../shaders/sampling/random.wesl")),
+    ("sampling::distribution", include_str!("../../../shaders/sampling/distribution.wesl")),
+    ("film::mapping", include_str!("../../../shaders/film/mapping.wesl")),
+    ("film::accumulate", include_str!("../../../shaders/film/accumulate.wesl")),
+    ("scene::traverse", include_str!("../../../shaders/scene/traverse.wesl")),
+    ("scene::texture", include_str!("../../../shaders/scene/texture.wesl")),
+    ("scene::alpha", include_str!("../../../shaders/scene/alpha.wesl")),
+    ("scene::surface", include_str!("../../../shaders/scene/surface.wesl")),
+    ("shading::microfacet", include_str!("../../../shaders/shading/microfacet.wesl")),
+    ("shading::bsdf", include_str!("../../../shaders/shading/bsdf.wesl")),
+    ("light::environment", include_str!("../../../shaders/light/environment.wesl")),
+    ("light::emitters", include_str!("../../../shaders/light/emitters.wesl")),
+    ("path::trace", include_str!("../../../shaders/path/trace.wesl")),
+    ("path::generate", include_str!("../../../shaders/path/generate.wesl")),
+    ("view::bindings", include_str!("../../../shaders/view/bindings.wesl")),
+    ("view::gather", include_str!("../../../shaders/view/gather.wesl")),
+    ("view::pull", include_str!("../../../shaders/view/pull.wesl")),
+    ("view::push", include_str!("../../../shaders/view/push.wesl")),
+    ("view::tonemap", include_str!("../../../shaders/view/tonemap.wesl")),
+    ("view::present", include_str!("../../../shaders/view/present.wesl")),
+];
+
+/// The kernels, each the entry module of its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Kernel {
+    /// Path tracing: one sample an invocation.
+    Trace,
+    /// Only the choice of the pixel and the primary ray, for the bench of ray generation.
+    Generate,
+    /// Records to film.
+    Accumulate,
+    /// Film to view.
+    Gather,
+    /// One level of the view's pyramid from the finer one.
+    Pull,
+    /// One level filled from the coarser one.
+    Push,
+    /// Tone mapping to the target.
+    Present,
+}
+
+impl Kernel {
+    /// Every kernel.
+    pub const ALL: [Self; 7] =
+        [Self::Trace, Self::Generate, Self::Accumulate, Self::Gather, Self::Pull, Self::Push, Self::Present];
+
+    /// Module below `shaders/`, which is also the label of pipeline, timer and dump.
+    pub const fn module(self) -> &'static str {
+        match self {
+            Self::Trace => "path::trace",
+            Self::Generate => "path::generate",
+            Self::Accumulate => "film::accumulate",
+            Self::Gather => "view::gather",
+            Self::Pull => "view::pull",
+            Self::Push => "view::push",
+            Self::Present => "view::present",
+        }
+    }
+
+    /// Name of the entry point (the fragment entry for [`Kernel::Present`]).
+    pub const fn entry_point(self) -> &'static str {
+        match self {
+            Self::Trace => "trace",
+            Self::Generate => "generate",
+            Self::Accumulate => "accumulate",
+            Self::Gather => "gather",
+            Self::Pull => "pull",
+            Self::Push => "push",
+            Self::Present => "present",
+        }
+    }
+}
+
+/// All that decides the text of a kernel, readable in logs and dumps.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct KernelKey {
+    /// Which kernel.
+    pub kernel: Kernel,
+    /// Compile-time flags.
+    pub features: SceneFeatures,
+    /// Numbers that the text contains.
+    pub constants: KernelConstants,
+    /// WGSL of the sampler: radial inverse and warp.
+    pub sampler: SamplerModule,
+}
+
+/// Numbers that a kernel's text contains.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct KernelConstants {
+    /// Entries of the traversal stack: enough for the depth of the hierarchies.
+    pub stack_size: u32,
+    /// Node index of the upper level's root.
+    pub tlas_root: u32,
+    /// Cells of the environment's importance grid.
+    pub environment_cells: [u32; 2],
+}
+
+/// WGSL text of a radial inverse with its name.
+#[derive(Clone, PartialEq, Eq, Hash)]
+pub struct SamplerModule {
+    name: String,
+    text: String,
+}
+
+impl SamplerModule {
+    /// The module of an inverse.
+    pub fn new(inverse: &Inverse) -> Self {
+        let text = format!(
+            "{}\n{}",
+            fovea_sampler::wgsl::radial_module(inverse),
+            fovea_sampler::wgsl::sequence_module()
+        );
+        Self { name: inverse.name().to_string(), text }
+    }
+}
+
+impl fmt::Debug for SamplerModule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.name)
+    }
+}
+
+impl fmt::Display for KernelKey {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = self.kernel.module().replace("::", "-");
+        match self.kernel {
+            Kernel::Trace | Kernel::Generate => {
+                write!(f, "{name}.{}.{}.stack{}", self.features, self.sampler.name, self.constants.stack_size)
+            }
+            _ => write!(f, "{name}"),
+        }
+    }
+}
+
+/// A shader that does not compose: a bug in this crate or in a hand-made module.
+#[derive(Debug, Error)]
+#[error("kernel {kernel} does not compose: {cause}")]
+pub struct ComposeError {
+    kernel: String,
+    cause: String,
+}
+
+/// Composes the WGSL text of a kernel. Declarations that it does not use are stripped.
+///
+/// # Errors
+/// When a module does not parse or a flag is unknown.
+pub fn compose(key: &KernelKey) -> Result<String, ComposeError> {
+    let fail = |cause: String| ComposeError { kernel: key.to_string(), cause };
+    let path = |module: &str| -> Result<ModulePath, ComposeError> {
+        format!("package::{module}").parse().map_err(|error| fail(format!("{error}")))
+    };
+    let mut resolver = VirtualResolver::new();
+    for (module, text) in MODULES {
+        resolver.add_module(path(module)?, Cow::Borrowed(*text));
+    }
+    resolver.add_module(path("sampler")?, Cow::Borrowed(&key.sampler.text));
+    resolver.add_module(path("constants")?, Cow::Owned(constants_module(&key.constants)));
+    let mut wesl = Wesl::new_barebones().set_custom_resolver(resolver);
+    wesl.set_options(CompileOptions { validate: false, lazy: true, strip: true, ..Default::default() });
+    wesl.set_missing_feature_behavior(wesl::Feature::Error);
+    wesl.set_custom_mangler(wesl::EscapeMangler);
+    for &feature in Feature::ALL {
+        wesl.set_feature(feature.name(), key.features.contains(feature));
+    }
+    let compiled = wesl.compile(&path(key.kernel.module())?).map_err(|error| fail(format!("{error}")))?;
+    Ok(compiled.to_string())
+}
+
+fn constants_module(c: &KernelConstants) -> String {
+    let numbers = [
+        ("WORKGROUP_SIZE", WORKGROUP_SIZE),
+        ("TILE_SIZE", TILE_SIZE),
+        ("FILM_WORDS", FILM_WORDS),
+        ("TEXEL_PAGE_BITS", TEXEL_PAGE_BITS),
+        ("FIRST_ROULETTE_BOUNCE", FIRST_ROULETTE_BOUNCE),
+        ("SOBOL_DIMENSIONS", sequence::DIMENSIONS as u32),
+        ("STACK_SIZE", c.stack_size.max(1)),
+        ("TLAS_ROOT", c.tlas_root),
+        ("ENVIRONMENT_CELLS_X", c.environment_cells[0].max(1)),
+        ("ENVIRONMENT_CELLS_Y", c.environment_cells[1].max(1)),
+    ];
+    numbers.iter().map(|(name, value)| format!("const {name}: u32 = {value}u;\n")).collect()
+}
+
+/// Sobol direction numbers as the kernels' uniform buffer wants them.
+pub(crate) fn direction_numbers() -> &'static [u32] {
+    static NUMBERS: OnceLock<Vec<u32>> = OnceLock::new();
+    NUMBERS.get_or_init(sequence::direction_numbers)
+}

@@ -1,0 +1,261 @@
+//! Structures shared with the shaders: twins of `shaders/types.wesl` and `shaders/view/bindings.wesl`.
+//!
+//! `tests/layout.rs` reflects the composed WGSL with naga and compares sizes, offsets and names with these.
+
+use bytemuck::{Pod, Zeroable};
+
+/// A 3x3 matrix as a uniform holds it: columns of four.
+pub type Columns3 = [[f32; 4]; 3];
+
+/// Columns of a rotation matrix.
+pub fn columns(m: glam::Mat3) -> Columns3 {
+    [m.x_axis.extend(0.0).to_array(), m.y_axis.extend(0.0).to_array(), m.z_axis.extend(0.0).to_array()]
+}
+
+macro_rules! shared {
+    ($($(#[$doc:meta])* struct $name:ident { $($field:ident: $ty:ty,)* })*) => {
+        $(
+            $(#[$doc])*
+            #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+            #[repr(C)]
+            #[expect(missing_docs, reason = "each field is explained beside its twin in the shader")]
+            pub struct $name { $(pub $field: $ty,)* }
+
+            impl $name {
+                /// Name, size and fields (name, offset), for the test against the shaders.
+                pub fn layout() -> StructLayout {
+                    StructLayout {
+                        name: stringify!($name),
+                        size: size_of::<$name>(),
+                        fields: vec![$((stringify!($field), std::mem::offset_of!($name, $field)),)*],
+                    }
+                }
+            }
+        )*
+
+        /// Every shared structure.
+        pub fn shared_layouts() -> Vec<StructLayout> {
+            vec![$($name::layout(),)*]
+        }
+    };
+}
+
+/// A structure as the host lays it out.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StructLayout {
+    /// Name in Rust and WGSL.
+    pub name: &'static str,
+    /// Bytes.
+    pub size: usize,
+    /// Name and offset of each field. Names that begin with `pad` exist only on the host.
+    pub fields: Vec<(&'static str, usize)>,
+}
+
+shared! {
+    /// One component of the distribution's mixture.
+    struct SampleLayer {
+        kind: u32,
+        cumulative: f32,
+        share: f32,
+        clip_tries: u32,
+        world_from_layer: Columns3,
+        screen_from_gaze: Columns3,
+        view_half_extent: [f32; 2],
+        screen_half_extent: [f32; 2],
+        clip_half_extent: [f32; 2],
+        list_first: u32,
+        list_count: u32,
+        radius_scale: f32,
+        pad_0: [u32; 3],
+        world_from_clip: Columns3,
+    }
+
+    /// One batch of samples.
+    struct BatchParams {
+        first_index_low: u32,
+        first_index_high: u32,
+        sample_count: u32,
+        seed: u32,
+        film_size: [u32; 2],
+        max_bounces: u32,
+        light_count: u32,
+        camera_position: [f32; 3],
+        environment_probability: f32,
+        world_from_film: Columns3,
+        environment_radiance: [f32; 3],
+        environment_rotation_turns: f32,
+        film_half_extent: [f32; 2],
+        first_slab_pixel: u32,
+        slab_pixel_count: u32,
+        radiance_scale: f32,
+        luminance_scale: f32,
+        layer_count: u32,
+        use_sobol: u32,
+        layers: [SampleLayer; MAX_LAYERS],
+    }
+
+    /// What a finished path leaves for the film.
+    struct SampleRecord {
+        radiance: [f32; 3],
+        pixel: u32,
+        rays: u32,
+        pad_0: [u32; 3],
+    }
+
+    /// A mesh placed in the world.
+    struct Instance {
+        world_from_mesh: [[f32; 4]; 3],
+        mesh_from_world: [[f32; 4]; 3],
+        root_node: u32,
+        material: u32,
+        first_light: u32,
+        first_triangle: u32,
+        flags: u32,
+        first_vertex: u32,
+        unused_0: u32,
+        unused_1: u32,
+    }
+
+    /// Shading attributes of a vertex.
+    struct Vertex {
+        normal: u32,
+        tangent: u32,
+        uv0: [f32; 2],
+        uv1: [f32; 2],
+        color_rg: u32,
+        color_ba: u32,
+    }
+
+    /// A material.
+    struct Material {
+        base_color: [f32; 4],
+        emission: [f32; 3],
+        flags: u32,
+        specular_color: [f32; 3],
+        specular: f32,
+        absorption: [f32; 3],
+        metallic: f32,
+        roughness: f32,
+        ior: f32,
+        transmission: f32,
+        alpha_cutoff: f32,
+        normal_scale: f32,
+        base_color_texture: u32,
+        metallic_roughness_texture: u32,
+        normal_texture: u32,
+        emissive_texture: u32,
+        specular_texture: u32,
+        specular_color_texture: u32,
+        transmission_texture: u32,
+    }
+
+    /// A material's reference to a texture.
+    struct TextureSlot {
+        matrix_u: [f32; 4],
+        matrix_v: [f32; 4],
+        offset: u32,
+        size: u32,
+        flags: u32,
+        unused: u32,
+    }
+
+    /// An emissive triangle or a punctual light.
+    struct Light {
+        position: [f32; 3],
+        probability: f32,
+        edge_1: [f32; 3],
+        alias_threshold: f32,
+        edge_2: [f32; 3],
+        alias_index: u32,
+        kind: u32,
+        instance: u32,
+        triangle: u32,
+        unused: u32,
+        cone: [f32; 2],
+        unused_2: [f32; 2],
+    }
+
+    /// A cell of the environment's importance grid.
+    struct EnvironmentCell {
+        density: f32,
+        alias_threshold: f32,
+        alias_index: u32,
+    }
+
+    /// Sums over the film's lifetime.
+    struct FilmCounters {
+        segments_low: u32,
+        segments_high: u32,
+        shadow_rays_low: u32,
+        shadow_rays_high: u32,
+        non_finite: u32,
+        clamped: u32,
+        stack_overflows: u32,
+        unused: u32,
+    }
+
+    /// One pass over the view's pixels.
+    struct ViewParams {
+        view_from_kind: u32,
+        level: u32,
+        size: [u32; 2],
+        world_from_view: Columns3,
+        film_from_world: Columns3,
+        view_half_extent: [f32; 2],
+        film_half_extent: [f32; 2],
+        film_size: [u32; 2],
+        first_slab_pixel: u32,
+        slab_pixel_count: u32,
+        level_offset: u32,
+        coarse_offset: u32,
+        coarse_size: [u32; 2],
+        quanta_to_radiance: f32,
+        confidence_samples: f32,
+        exposure: f32,
+        tone_map: u32,
+        debug_view: u32,
+        debug_scale: f32,
+        fill: u32,
+        stale_weight: f32,
+        stale_from_world: Columns3,
+        stale_half_extent: [f32; 2],
+        stale_size: [u32; 2],
+        gaze_in_view: [f32; 2],
+        ring_tangent: f32,
+        pad_0: u32,
+    }
+}
+
+/// Layers that a mixture may have.
+pub const MAX_LAYERS: usize = 8;
+
+/// `SampleLayer::kind` and other enumerations of `types.wesl`.
+pub mod codes {
+    #![expect(missing_docs, reason = "named as in the shader")]
+    pub const LAYER_FILM: u32 = 0;
+    pub const LAYER_SPHERE: u32 = 1;
+    pub const LAYER_IMAGE_PLANE: u32 = 2;
+    pub const LAYER_PIXEL_LIST: u32 = 3;
+    pub const LAYER_GAZE: u32 = 4;
+    pub const LAYER_GAZE_AT_EYE: u32 = 5;
+    pub const NONE: u32 = u32::MAX;
+    pub const INSTANCE_MIRRORED: u32 = 1;
+    pub const INSTANCE_ALPHA: u32 = 2;
+    pub const MATERIAL_DOUBLE_SIDED: u32 = 1;
+    pub const MATERIAL_ALPHA_MASK: u32 = 2;
+    pub const MATERIAL_ALPHA_BLEND: u32 = 4;
+    pub const MATERIAL_UNLIT: u32 = 8;
+    pub const MATERIAL_SOLID: u32 = 16;
+    pub const TEXTURE_SRGB: u32 = 1;
+    pub const TEXTURE_LINEAR_FILTER: u32 = 2;
+    pub const TEXTURE_UV1: u32 = 4;
+    pub const WRAP_REPEAT: u32 = 0;
+    pub const WRAP_MIRROR: u32 = 1;
+    pub const WRAP_CLAMP: u32 = 2;
+    pub const LIGHT_TRIANGLE: u32 = 0;
+    pub const LIGHT_POINT: u32 = 1;
+    pub const LIGHT_SPOT: u32 = 2;
+    pub const LIGHT_DIRECTIONAL: u32 = 3;
+    pub const VIEW_EQUIRECT: u32 = 0;
+    pub const VIEW_PERSPECTIVE: u32 = 1;
+}

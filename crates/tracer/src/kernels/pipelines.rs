@@ -1,0 +1,251 @@
+//! Pipelines made of composed kernels, with the bindings that each kernel really has.
+
+use std::{collections::HashMap, sync::Arc};
+
+use thiserror::Error;
+
+use super::{ComposeError, Kernel, KernelKey, compose};
+
+/// Why a kernel has no pipeline.
+#[derive(Debug, Error)]
+pub enum KernelError {
+    /// Its modules do not compose.
+    #[error(transparent)]
+    Compose(#[from] ComposeError),
+    /// The composed text is not WGSL.
+    #[error("kernel {kernel}: {cause}")]
+    Wgsl {
+        /// The key's label.
+        kernel: String,
+        /// The parser's words.
+        cause: String,
+    },
+    /// The driver refused.
+    #[error("the driver does not compile kernel {kernel}: {cause}")]
+    Driver {
+        /// The key's label.
+        kernel: String,
+        /// The driver's words.
+        cause: String,
+    },
+}
+
+/// A compiled kernel: compute, or the render pipeline of [`Kernel::Present`].
+#[derive(Debug)]
+pub struct Pipeline {
+    kind: PipelineKind,
+    groups: Vec<(wgpu::BindGroupLayout, Vec<u32>)>,
+    label: String,
+}
+
+#[derive(Debug)]
+enum PipelineKind {
+    Compute(wgpu::ComputePipeline),
+    Render(wgpu::RenderPipeline),
+}
+
+impl Pipeline {
+    fn create(
+        device: &wgpu::Device,
+        key: &KernelKey,
+        target: Option<wgpu::TextureFormat>,
+    ) -> Result<Self, KernelError> {
+        let label = key.to_string();
+        let text = compose(key)?;
+        let module = naga::front::wgsl::parse_str(&text)
+            .map_err(|error| KernelError::Wgsl { kernel: label.clone(), cause: error.emit_to_string(&text) })?;
+        let stages = if key.kernel == Kernel::Present {
+            wgpu::ShaderStages::FRAGMENT | wgpu::ShaderStages::VERTEX
+        } else {
+            wgpu::ShaderStages::COMPUTE
+        };
+        let groups = reflect(device, &module, stages, &label);
+        let layouts: Vec<_> = groups.iter().map(|(layout, _)| Some(layout)).collect();
+        let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(&label),
+            bind_group_layouts: &layouts,
+            immediate_size: 0,
+        });
+        let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(&label),
+            source: wgpu::ShaderSource::Wgsl(text.into()),
+        });
+        let kind = match target {
+            None => PipelineKind::Compute(device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(&label),
+                layout: Some(&layout),
+                module: &shader,
+                entry_point: Some(key.kernel.entry_point()),
+                compilation_options: Default::default(),
+                cache: None,
+            })),
+            Some(format) => PipelineKind::Render(device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some(&label),
+                layout: Some(&layout),
+                vertex: wgpu::VertexState {
+                    module: &shader,
+                    entry_point: Some("cover"),
+                    compilation_options: Default::default(),
+                    buffers: &[],
+                },
+                primitive: Default::default(),
+                depth_stencil: None,
+                multisample: Default::default(),
+                fragment: Some(wgpu::FragmentState {
+                    module: &shader,
+                    entry_point: Some(key.kernel.entry_point()),
+                    compilation_options: Default::default(),
+                    targets: &[Some(format.into())],
+                }),
+                multiview_mask: None,
+                cache: None,
+            })),
+        };
+        if let Some(error) = pollster::block_on(scope.pop()) {
+            return Err(KernelError::Driver { kernel: label, cause: error.to_string() });
+        }
+        Ok(Self { kind, groups, label })
+    }
+
+    /// The key's label.
+    pub fn label(&self) -> &str {
+        &self.label
+    }
+
+    /// A bind group of what the kernel uses among `resources`.
+    pub fn bind(
+        &self,
+        device: &wgpu::Device,
+        group: usize,
+        resources: &[(u32, wgpu::BindingResource<'_>)],
+    ) -> Option<wgpu::BindGroup> {
+        let (layout, used) = self.groups.get(group)?;
+        let entries: Vec<_> = resources
+            .iter()
+            .filter(|(binding, _)| used.contains(binding))
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding: *binding, resource: resource.clone() })
+            .collect();
+        Some(device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(&self.label),
+            layout,
+            entries: &entries,
+        }))
+    }
+
+    /// Sets a compute pass to this kernel and dispatches it.
+    ///
+    /// # Panics
+    /// On the render pipeline of [`Kernel::Present`], which is a bug in this crate.
+    pub fn dispatch(&self, pass: &mut wgpu::ComputePass<'_>, groups: &[&Option<wgpu::BindGroup>], workgroups: [u32; 2]) {
+        let PipelineKind::Compute(pipeline) = &self.kind else { panic!("{} is no compute kernel", self.label) };
+        pass.set_pipeline(pipeline);
+        for (index, group) in groups.iter().enumerate() {
+            if let Some(group) = group {
+                pass.set_bind_group(index as u32, group, &[]);
+            }
+        }
+        pass.dispatch_workgroups(workgroups[0], workgroups[1], 1);
+    }
+
+    /// Draws the covering triangle with this kernel.
+    ///
+    /// # Panics
+    /// On a compute kernel, which is a bug in this crate.
+    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, group: &Option<wgpu::BindGroup>) {
+        let PipelineKind::Render(pipeline) = &self.kind else { panic!("{} is no render kernel", self.label) };
+        pass.set_pipeline(pipeline);
+        if let Some(group) = group {
+            pass.set_bind_group(0, group, &[]);
+        }
+        pass.draw(0..3, 0..1);
+    }
+}
+
+/// Bind group layouts of the module's global variables, and the bindings in each.
+fn reflect(
+    device: &wgpu::Device,
+    module: &naga::Module,
+    visibility: wgpu::ShaderStages,
+    label: &str,
+) -> Vec<(wgpu::BindGroupLayout, Vec<u32>)> {
+    let mut groups: Vec<Vec<wgpu::BindGroupLayoutEntry>> = Vec::new();
+    for (_, variable) in module.global_variables.iter() {
+        let Some(binding) = variable.binding else { continue };
+        let ty = match variable.space {
+            naga::AddressSpace::Uniform => buffer_type(wgpu::BufferBindingType::Uniform),
+            naga::AddressSpace::Storage { access } => buffer_type(wgpu::BufferBindingType::Storage {
+                read_only: !access.contains(naga::StorageAccess::STORE),
+            }),
+            _ => {
+                let arrayed = matches!(module.types[variable.ty].inner, naga::TypeInner::Image { arrayed: true, .. });
+                wgpu::BindingType::Texture {
+                    sample_type: wgpu::TextureSampleType::Float { filterable: false },
+                    view_dimension: if arrayed {
+                        wgpu::TextureViewDimension::D2Array
+                    } else {
+                        wgpu::TextureViewDimension::D2
+                    },
+                    multisampled: false,
+                }
+            }
+        };
+        let group = binding.group as usize;
+        groups.resize_with(groups.len().max(group + 1), Vec::new);
+        groups[group].push(wgpu::BindGroupLayoutEntry { binding: binding.binding, visibility, ty, count: None });
+    }
+    groups
+        .into_iter()
+        .map(|mut entries| {
+            entries.sort_by_key(|entry| entry.binding);
+            let layout = device
+                .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries });
+            (layout, entries.iter().map(|entry| entry.binding).collect())
+        })
+        .collect()
+}
+
+fn buffer_type(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
+    wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None }
+}
+
+/// Pipelines by key. Each is made once.
+#[derive(Debug, Default)]
+pub struct PipelineCache(HashMap<(KernelKey, Option<wgpu::TextureFormat>), Arc<Pipeline>>);
+
+impl PipelineCache {
+    /// The pipeline of a compute kernel.
+    ///
+    /// # Errors
+    /// When it does not compose or compile.
+    pub fn compute(&mut self, device: &wgpu::Device, key: &KernelKey) -> Result<Arc<Pipeline>, KernelError> {
+        self.get(device, key, None)
+    }
+
+    /// The pipeline that presents to targets of this format.
+    ///
+    /// # Errors
+    /// When it does not compose or compile.
+    pub fn present(
+        &mut self,
+        device: &wgpu::Device,
+        key: &KernelKey,
+        format: wgpu::TextureFormat,
+    ) -> Result<Arc<Pipeline>, KernelError> {
+        self.get(device, key, Some(format))
+    }
+
+    fn get(
+        &mut self,
+        device: &wgpu::Device,
+        key: &KernelKey,
+        target: Option<wgpu::TextureFormat>,
+    ) -> Result<Arc<Pipeline>, KernelError> {
+        if let Some(pipeline) = self.0.get(&(key.clone(), target)) {
+            return Ok(pipeline.clone());
+        }
+        let pipeline = Arc::new(Pipeline::create(device, key, target)?);
+        self.0.insert((key.clone(), target), pipeline.clone());
+        Ok(pipeline)
+    }
+}

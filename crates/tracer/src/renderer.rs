@@ -1,0 +1,592 @@
+//! The renderer that every consumer drives: desktop, headset, command line, tests and benches.
+
+use std::{sync::Arc, time::Instant};
+
+use glam::{Mat3, Quat, Vec3};
+use thiserror::Error;
+
+use crate::{
+    distribution::Distribution,
+    features::Feature,
+    film::{Film, FilmMapping, FilmOptions, FilmSnapshot, ReadError},
+    gpu::Gpu,
+    kernels::{
+        self, Kernel, KernelConstants, KernelKey, SamplerModule, WORKGROUP_SIZE,
+        layout::{self, BatchParams, SampleRecord},
+        pipelines::{KernelError, Pipeline, PipelineCache},
+    },
+    scene::Scene,
+    upload::{BlasCache, SceneOnGpu, UploadError, UploadReport},
+    view::{ViewRenderer, ViewSettings},
+};
+
+/// Why the renderer cannot go on.
+#[derive(Debug, Error)]
+pub enum RenderError {
+    /// A scene does not fit the adapter.
+    #[error(transparent)]
+    Upload(#[from] UploadError),
+    /// A kernel does not compile.
+    #[error(transparent)]
+    Kernel(#[from] KernelError),
+    /// A buffer could not be read back.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// The film is larger than the device's memory.
+    #[error("a film of {width}x{height} pixels needs {bytes} bytes, more than adapter {adapter} can give")]
+    FilmTooLarge {
+        /// Pixels.
+        width: u32,
+        /// Pixels.
+        height: u32,
+        /// What it needs.
+        bytes: u64,
+        /// Its name.
+        adapter: String,
+    },
+    /// Tracing was asked for before a scene was set.
+    #[error("no scene to trace")]
+    NoScene,
+    /// The device stopped answering.
+    #[error("the graphics device was lost")]
+    DeviceLost,
+}
+
+/// Where samples' random numbers come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum SequenceKind {
+    /// Owen-scrambled Sobol by global index.
+    #[default]
+    Sobol,
+    /// Independent numbers, for statistics.
+    Independent,
+}
+
+/// Fixed at creation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RendererOptions {
+    /// Size and mapping of the film.
+    pub film: FilmOptions,
+    /// Indirect bounces; higher is more accurate in enclosed and transparent scenes, and slower. At most 65,000.
+    pub max_bounces: u32,
+    /// Equal seeds give equal films.
+    pub seed: u32,
+    /// Where random numbers come from.
+    pub sequence: SequenceKind,
+}
+
+impl Default for RendererOptions {
+    /// A 2048x1024 panorama, 8 bounces, seed 1, Sobol.
+    fn default() -> Self {
+        Self { film: FilmOptions::equirect(2048, 1024), max_bounces: 8, seed: 1, sequence: SequenceKind::Sobol }
+    }
+}
+
+/// Where the film's centre of projection is and what its centre looks at. A change restarts the film.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FilmPose {
+    /// Metres, in the scene's coordinates.
+    pub position: Vec3,
+    /// World from film.
+    pub world_from_film: Quat,
+}
+
+impl Default for FilmPose {
+    fn default() -> Self {
+        Self { position: Vec3::ZERO, world_from_film: Quat::IDENTITY }
+    }
+}
+
+/// What setting a scene took.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SceneReport {
+    /// Building and uploading.
+    pub upload: UploadReport,
+    /// Composing and compiling kernels, with a first dispatch that does nothing.
+    pub kernel_compile_secs: f64,
+}
+
+/// What was traced since the last restart.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RenderStatistics {
+    /// Samples.
+    pub samples: u64,
+    /// Closest-hit rays.
+    pub segments: u64,
+    /// Shadow rays.
+    pub shadow_rays: u64,
+    /// Samples that were not finite and were dropped.
+    pub non_finite: u32,
+    /// Samples brighter than the film's range, which were clamped.
+    pub clamped: u32,
+}
+
+/// When a render is done.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StopCondition {
+    /// After this many samples in total.
+    Samples(u64),
+    /// After this many seconds of tracing.
+    Seconds(f64),
+}
+
+/// Largest batch, in samples.
+pub const LARGEST_BATCH: u32 = 1 << 18;
+/// First batch after a change, in samples.
+pub const FIRST_BATCH: u32 = 1 << 14;
+
+/// Traces a scene progressively into a film.
+#[derive(Debug)]
+pub struct Renderer {
+    gpu: Gpu,
+    options: RendererOptions,
+    film: Film,
+    blas: BlasCache,
+    scene: Option<SceneOnGpu>,
+    pose: FilmPose,
+    distribution: Distribution,
+    pixel_list: wgpu::Buffer,
+    sampler: SamplerModule,
+    pipelines: PipelineCache,
+    bound: Option<BoundKernels>,
+    /// One per slab of the film: they differ in the slab alone.
+    params: Vec<wgpu::Buffer>,
+    records: wgpu::Buffer,
+    direction_numbers: wgpu::Buffer,
+    samples: u64,
+    first_sample: u64,
+    view: ViewRenderer,
+}
+
+/// Kernels of the present scene and distribution with their bind groups.
+#[derive(Debug)]
+struct BoundKernels {
+    trace: Arc<Pipeline>,
+    trace_groups: [Option<wgpu::BindGroup>; 2],
+    accumulate: Arc<Pipeline>,
+    accumulate_groups: Vec<Option<wgpu::BindGroup>>,
+}
+
+impl Renderer {
+    /// Allocates the film and what does not depend on a scene.
+    ///
+    /// # Errors
+    /// When the film does not fit the device.
+    pub fn new(gpu: &Gpu, options: &RendererOptions, distribution: Distribution) -> Result<Self, RenderError> {
+        let too_large = || RenderError::FilmTooLarge {
+            width: options.film.width,
+            height: options.film.height,
+            bytes: options.film.bytes(),
+            adapter: gpu.info().name.clone(),
+        };
+        if options.film.pixels() > u64::from(u32::MAX) || u64::from(options.film.width) * 40 > gpu.largest_binding() {
+            return Err(too_large());
+        }
+        let film = Film::new(gpu, options.film).ok_or_else(too_large)?;
+        let buffer = |label, size: u64, usage| {
+            let usage = usage | wgpu::BufferUsages::COPY_DST;
+            gpu.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
+        };
+        let params = film
+            .slabs
+            .iter()
+            .map(|_| buffer("batch parameters", size_of::<BatchParams>() as u64, wgpu::BufferUsages::UNIFORM))
+            .collect();
+        let records = buffer(
+            "sample records",
+            u64::from(LARGEST_BATCH) * size_of::<SampleRecord>() as u64,
+            wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
+        );
+        let numbers = kernels::direction_numbers();
+        let direction_numbers =
+            buffer("Sobol direction numbers", size_of_val(numbers) as u64, wgpu::BufferUsages::UNIFORM);
+        gpu.queue.write_buffer(&direction_numbers, 0, bytemuck::cast_slice(numbers));
+        let sampler = SamplerModule::new(distribution.inverse());
+        let mut renderer = Self {
+            view: ViewRenderer::new(gpu),
+            pixel_list: buffer("pixel list", 16, wgpu::BufferUsages::STORAGE),
+            gpu: gpu.clone(),
+            options: *options,
+            film,
+            blas: BlasCache::default(),
+            scene: None,
+            pose: FilmPose::default(),
+            distribution,
+            sampler,
+            pipelines: PipelineCache::default(),
+            bound: None,
+            params,
+            records,
+            direction_numbers,
+            samples: 0,
+            first_sample: 0,
+        };
+        renderer.upload_pixel_list();
+        Ok(renderer)
+    }
+
+    /// Uploads a scene version, compiles its kernels and restarts the film.
+    ///
+    /// # Errors
+    /// When the scene does not fit the device or a kernel does not compile; the last scene then stays.
+    pub fn set_scene(&mut self, scene: &Scene) -> Result<SceneReport, RenderError> {
+        let uploaded = SceneOnGpu::upload(&self.gpu, scene, &mut self.blas)?;
+        let upload = uploaded.report;
+        let before = self.scene.replace(uploaded);
+        let started = Instant::now();
+        if let Err(error) = self.bind().and_then(|()| self.warm_up()) {
+            self.scene = before;
+            self.bound = None;
+            return Err(error);
+        }
+        let kernel_compile_secs = started.elapsed().as_secs_f64();
+        self.restart();
+        Ok(SceneReport { upload, kernel_compile_secs })
+    }
+
+    /// Moves or turns the film; restarts it when that is a change.
+    pub fn set_pose(&mut self, pose: FilmPose) {
+        if self.pose != pose {
+            self.pose = pose;
+            self.restart();
+        }
+    }
+
+    /// The film's pose.
+    pub fn pose(&self) -> FilmPose {
+        self.pose
+    }
+
+    /// Changes how samples are spread. Nothing restarts.
+    ///
+    /// # Errors
+    /// When the kernel of a new radial inverse does not compile; the last distribution then stays.
+    pub fn set_distribution(&mut self, distribution: Distribution) -> Result<(), RenderError> {
+        let before = std::mem::replace(&mut self.distribution, distribution);
+        if !Arc::ptr_eq(before.inverse(), self.distribution.inverse()) {
+            let sampler = SamplerModule::new(self.distribution.inverse());
+            if sampler != self.sampler {
+                let old = std::mem::replace(&mut self.sampler, sampler);
+                if let Err(error) = self.rebind() {
+                    self.sampler = old;
+                    self.distribution = before;
+                    self.rebind()?;
+                    return Err(error);
+                }
+            }
+        }
+        self.upload_pixel_list();
+        Ok(())
+    }
+
+    /// Starts the film anew; what is shown meanwhile is the old picture.
+    pub fn restart(&mut self) {
+        self.view.keep_as_stale(&self.gpu);
+        let mut encoder = self.encoder("restart");
+        self.film.clear(&mut encoder);
+        self.gpu.queue.submit([encoder.finish()]);
+        self.samples = 0;
+    }
+
+    /// Samples traced since the last restart.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// Index of the first sample after a restart: renders of disjoint ranges of one seed can be merged.
+    pub fn set_first_sample(&mut self, first: u64) {
+        self.first_sample = first;
+    }
+
+    /// The options that this renderer was made with.
+    pub fn options(&self) -> &RendererOptions {
+        &self.options
+    }
+
+    /// The device that this renderer draws on.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// Records and submits one batch of at most [`LARGEST_BATCH`] samples; does not wait.
+    ///
+    /// # Errors
+    /// When there is no scene.
+    pub fn trace(&mut self, samples: u32) -> Result<(), RenderError> {
+        let samples = samples.min(LARGEST_BATCH);
+        self.write_params(samples)?;
+        let bound = self.bound.as_ref().ok_or(RenderError::NoScene)?;
+        let mut encoder = self.encoder("batch");
+        bound.record(&mut encoder, samples);
+        self.gpu.queue.submit([encoder.finish()]);
+        self.samples += u64::from(samples);
+        Ok(())
+    }
+
+    /// Traces until `stop`, in batches of about a tenth of a second; `progress` hears the fraction done after each and
+    /// returns false to stop early. Returns the seconds of tracing.
+    ///
+    /// # Errors
+    /// When there is no scene or the device is lost.
+    pub fn render(&mut self, stop: StopCondition, mut progress: impl FnMut(f64) -> bool) -> Result<f64, RenderError> {
+        let target = 0.1;
+        let started = Instant::now();
+        let mut batch = FIRST_BATCH;
+        loop {
+            let fraction = match stop {
+                StopCondition::Samples(total) => {
+                    let left = total.saturating_sub(self.samples);
+                    batch = batch.min(left.min(u64::from(LARGEST_BATCH)) as u32);
+                    if left == 0 { 1.0 } else { self.samples as f64 / total as f64 }
+                }
+                StopCondition::Seconds(seconds) => started.elapsed().as_secs_f64() / seconds.max(1e-9),
+            };
+            let wants_more = progress(fraction.min(1.0));
+            if fraction >= 1.0 || !wants_more {
+                return Ok(started.elapsed().as_secs_f64());
+            }
+            let batch_started = Instant::now();
+            self.trace(batch)?;
+            self.gpu.wait().map_err(|_| RenderError::DeviceLost)?;
+            let growth = (target / batch_started.elapsed().as_secs_f64().max(1e-6)).clamp(0.5, 2.0);
+            batch = ((f64::from(batch) * growth) as u32).clamp(1024, LARGEST_BATCH) & !63;
+        }
+    }
+
+    /// Reads the film back, waiting for the device.
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn snapshot(&self) -> Result<FilmSnapshot, RenderError> {
+        let (radiance_scale, luminance_scale) = self.film_scales();
+        Ok(FilmSnapshot {
+            options: self.options.film,
+            words: self.film.read(&self.gpu)?,
+            radiance_scale: f64::from(radiance_scale),
+            luminance_scale: f64::from(luminance_scale),
+            samples: self.samples,
+        })
+    }
+
+    /// Counts since the last restart, waiting for the device.
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn statistics(&self) -> Result<RenderStatistics, RenderError> {
+        let c = self.film.read_counters(&self.gpu)?;
+        Ok(RenderStatistics {
+            samples: self.samples,
+            segments: u64::from(c.segments_low) | u64::from(c.segments_high) << 32,
+            shadow_rays: u64::from(c.shadow_rays_low) | u64::from(c.shadow_rays_high) << 32,
+            non_finite: c.non_finite,
+            clamped: c.clamped,
+        })
+    }
+
+    /// Reconstructs the view from the film and presents it to a target of the view's size.
+    ///
+    /// # Errors
+    /// When a kernel does not compile for the target's format.
+    pub fn present(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        settings: &ViewSettings,
+        target: &wgpu::TextureView,
+        format: wgpu::TextureFormat,
+    ) -> Result<(), RenderError> {
+        let keys = Kernel::ALL.map(|kernel| (kernel, self.key(kernel)));
+        let quanta_to_radiance = 1.0 / self.film_scales().0;
+        self.view.record(
+            encoder,
+            &mut self.pipelines,
+            &|kernel| keys.iter().find(|(k, _)| *k == kernel).map(|(_, key)| key.clone()),
+            &self.film,
+            self.pose.world_from_film,
+            quanta_to_radiance,
+            settings,
+            target,
+            format,
+        )
+    }
+
+    /// The present kernels' text by their label.
+    ///
+    /// # Errors
+    /// When a kernel does not compose.
+    pub fn kernel_texts(&self) -> Result<Vec<(String, String)>, RenderError> {
+        Kernel::ALL
+            .iter()
+            .map(|&kernel| {
+                let key = self.key(kernel);
+                Ok((key.to_string(), kernels::compose(&key).map_err(KernelError::from)?))
+            })
+            .collect()
+    }
+
+    /// Key of a kernel for the present scene, film and distribution.
+    pub fn key(&self, kernel: Kernel) -> KernelKey {
+        let perspective = matches!(self.options.film.mapping, FilmMapping::Perspective { .. });
+        let scene = self.scene.as_ref();
+        let features = if kernel == Kernel::Trace { scene.map(|s| s.features).unwrap_or_default() } else { Default::default() };
+        KernelKey {
+            kernel,
+            features: features.with(Feature::PerspectiveFilm, perspective),
+            constants: if kernel == Kernel::Trace {
+                scene.map(|s| s.constants).unwrap_or_default()
+            } else {
+                KernelConstants::default()
+            },
+            sampler: self.sampler.clone(),
+        }
+    }
+
+    fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
+        self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) })
+    }
+
+    /// Powers of two: 16 times the brightest source is the largest sample that the film holds.
+    fn film_scales(&self) -> (f32, f32) {
+        let brightest = self.scene.as_ref().map_or(1.0, |s| s.brightest_radiance);
+        let exponent = brightest.log2().ceil().clamp(-60.0, 60.0) as i32 + 4;
+        (2f32.powi(38 - exponent), 2f32.powi(32 - exponent))
+    }
+
+    fn write_params(&self, samples: u32) -> Result<(), RenderError> {
+        let scene = self.scene.as_ref().ok_or(RenderError::NoScene)?;
+        let (layers, layer_count, _) = self.distribution.encode();
+        let first = self.first_sample + self.samples;
+        let (radiance_scale, luminance_scale) = self.film_scales();
+        for (slab, buffer) in self.film.slabs.iter().zip(&self.params) {
+            let params = BatchParams {
+                first_index_low: first as u32,
+                first_index_high: (first >> 32) as u32,
+                sample_count: samples,
+                seed: self.options.seed,
+                film_size: [self.options.film.width, self.options.film.height],
+                max_bounces: self.options.max_bounces.min(65_000),
+                light_count: scene.light_count,
+                camera_position: self.pose.position.to_array(),
+                environment_probability: scene.environment_probability,
+                world_from_film: layout::columns(Mat3::from_quat(self.pose.world_from_film)),
+                environment_radiance: scene.environment_radiance.to_array(),
+                environment_rotation_turns: scene.environment_rotation_turns,
+                film_half_extent: self.options.film.half_extent(),
+                first_slab_pixel: slab.first_pixel,
+                slab_pixel_count: slab.pixel_count,
+                radiance_scale,
+                luminance_scale,
+                layer_count,
+                use_sobol: u32::from(self.options.sequence == SequenceKind::Sobol),
+                layers,
+            };
+            self.gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&params));
+        }
+        Ok(())
+    }
+
+    fn upload_pixel_list(&mut self) {
+        let (_, _, pixels) = self.distribution.encode();
+        if pixels.is_empty() {
+            return;
+        }
+        let bytes: &[u8] = bytemuck::cast_slice(&pixels);
+        if self.pixel_list.size() < bytes.len() as u64 {
+            self.pixel_list = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("pixel list"),
+                size: bytes.len() as u64,
+                usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            });
+            if let (Some(scene), Some(bound)) = (&self.scene, &mut self.bound) {
+                bound.trace_groups = trace_groups(
+                    &self.gpu.device,
+                    &bound.trace,
+                    scene,
+                    [&self.params[0], &self.records, &self.pixel_list, &self.direction_numbers],
+                );
+            }
+        }
+        self.gpu.queue.write_buffer(&self.pixel_list, 0, bytes);
+    }
+
+    fn rebind(&mut self) -> Result<(), RenderError> {
+        if self.scene.is_some() { self.bind() } else { Ok(()) }
+    }
+
+    fn bind(&mut self) -> Result<(), RenderError> {
+        let trace_key = self.key(Kernel::Trace);
+        let accumulate_key = self.key(Kernel::Accumulate);
+        let scene = self.scene.as_ref().ok_or(RenderError::NoScene)?;
+        let device = &self.gpu.device;
+        let trace = self.pipelines.compute(device, &trace_key)?;
+        let accumulate = self.pipelines.compute(device, &accumulate_key)?;
+        let trace_groups = trace_groups(
+            device,
+            &trace,
+            scene,
+            [&self.params[0], &self.records, &self.pixel_list, &self.direction_numbers],
+        );
+        let accumulate_groups = self
+            .film
+            .slabs
+            .iter()
+            .zip(&self.params)
+            .map(|(slab, params)| {
+                accumulate.bind(
+                    device,
+                    0,
+                    &[
+                        (0, params.as_entire_binding()),
+                        (1, self.records.as_entire_binding()),
+                        (2, slab.buffer.as_entire_binding()),
+                        (3, self.film.counters.as_entire_binding()),
+                    ],
+                )
+            })
+            .collect();
+        self.bound = Some(BoundKernels { trace, trace_groups, accumulate, accumulate_groups });
+        Ok(())
+    }
+
+    /// Dispatches the kernels over no samples: some drivers compile at the first dispatch.
+    fn warm_up(&mut self) -> Result<(), RenderError> {
+        self.write_params(0)?;
+        let bound = self.bound.as_ref().ok_or(RenderError::NoScene)?;
+        let mut encoder = self.encoder("warm-up");
+        bound.record(&mut encoder, 1);
+        self.gpu.queue.submit([encoder.finish()]);
+        self.gpu.wait().map_err(|_| RenderError::DeviceLost)
+    }
+}
+
+impl BoundKernels {
+    /// One batch: trace, then add to every slab.
+    fn record(&self, encoder: &mut wgpu::CommandEncoder, samples: u32) {
+        let groups = samples.div_ceil(WORKGROUP_SIZE).max(1);
+        let workgroups = [groups.min(1 << 15), groups.div_ceil(1 << 15)];
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some(self.trace.label()),
+            timestamp_writes: None,
+        });
+        self.trace.dispatch(&mut pass, &[&self.trace_groups[0], &self.trace_groups[1]], workgroups);
+        for group in &self.accumulate_groups {
+            self.accumulate.dispatch(&mut pass, &[group], workgroups);
+        }
+    }
+}
+
+/// Groups 0 and 1 of a path kernel; `batch` is parameters, records, pixel list, direction numbers.
+fn trace_groups(
+    device: &wgpu::Device,
+    kernel: &Pipeline,
+    scene: &SceneOnGpu,
+    batch: [&wgpu::Buffer; 4],
+) -> [Option<wgpu::BindGroup>; 2] {
+    let numbered = |(index, buffer): (usize, &&wgpu::Buffer)| (index as u32, buffer.as_entire_binding());
+    let first: Vec<_> = batch.iter().enumerate().map(numbered).collect();
+    let mut second: Vec<_> =
+        scene.bindings.buffers.iter().enumerate().map(|(i, b)| (i as u32, b.as_entire_binding())).collect();
+    let textures = scene.bindings.textures.iter().enumerate();
+    second.extend(textures.map(|(i, t)| (8 + i as u32, wgpu::BindingResource::TextureView(t))));
+    [kernel.bind(device, 0, &first), kernel.bind(device, 1, &second)]
+}

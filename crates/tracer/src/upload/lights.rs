@@ -1,0 +1,141 @@
+//! The light table: every emissive triangle and punctual light, weighted by power.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+
+use super::AliasTable;
+use crate::{
+    bvh::Blas,
+    kernels::layout::{self, codes},
+    scene::{PunctualKind, PunctualLight, Scene, Texture},
+};
+
+/// Lights with their alias rows.
+pub struct LightTable {
+    /// Emissive triangles in the leaf order of their instances, then punctual lights.
+    pub lights: Vec<layout::Light>,
+    /// Index of the first light of each instance in TLAS order, or `NONE`.
+    pub first_lights: Vec<u32>,
+    /// Largest radiance of a source that is seen; punctual lights count by their effect at a metre.
+    pub brightest: f32,
+}
+
+impl LightTable {
+    /// Builds the table of a scene's visible lights.
+    pub fn build(scene: &Scene, instance_order: &[u32], blas: &[Arc<Blas>], first_triangles: &[u32]) -> Self {
+        let mut lights = Vec::new();
+        let mut powers = Vec::new();
+        let mut first_lights = Vec::with_capacity(instance_order.len());
+        let mut brightest: f32 = 0.0;
+        for (tlas_index, &index) in instance_order.iter().enumerate() {
+            let instance = &scene.instances[index as usize];
+            let material = &scene.materials[instance.material as usize];
+            if material.emission.max_element() <= 0.0 || material.unlit {
+                first_lights.push(codes::NONE);
+                continue;
+            }
+            first_lights.push(lights.len() as u32);
+            brightest = brightest.max(material.emission.max_element());
+            let mean = material
+                .emissive_texture
+                .map_or(Vec3::ONE, |reference| mean_color(&scene.textures[reference.texture as usize]));
+            let sides = if material.double_sided { 2.0 } else { 1.0 };
+            // Black texels in a dark texture still must be reachable where its mean is not zero elsewhere.
+            let radiance = f64::from(luminance(material.emission * mean.max(Vec3::splat(1e-4)))) * sides;
+            let mesh = &scene.meshes[instance.mesh as usize];
+            let order = &blas[instance.mesh as usize].triangle_order;
+            for (leaf, &triangle) in order.iter().enumerate() {
+                let [a, b, c] = mesh.triangles[triangle as usize]
+                    .map(|v| instance.world_from_mesh.transform_point3(mesh.positions[v as usize]));
+                let (edge_1, edge_2) = (b - a, c - a);
+                powers.push(radiance * std::f64::consts::PI * 0.5 * edge_1.as_dvec3().cross(edge_2.as_dvec3()).length());
+                lights.push(layout::Light {
+                    position: a.to_array(),
+                    edge_1: edge_1.to_array(),
+                    edge_2: edge_2.to_array(),
+                    kind: codes::LIGHT_TRIANGLE,
+                    instance: tlas_index as u32,
+                    triangle: first_triangles[instance.mesh as usize] + leaf as u32,
+                    ..bytemuck::Zeroable::zeroed()
+                });
+            }
+        }
+        let reach = scene_radius(scene);
+        for light in scene.lights.iter().filter(|light| light.intensity.max_element() > 0.0) {
+            brightest = brightest.max(light.intensity.max_element());
+            powers.push(punctual_power(light, reach));
+            lights.push(encode_punctual(light));
+        }
+        let table = AliasTable::build(&powers);
+        for (i, light) in lights.iter_mut().enumerate() {
+            light.probability = table.probabilities[i];
+            light.alias_threshold = table.thresholds[i];
+            light.alias_index = table.aliases[i];
+        }
+        Self { lights, first_lights, brightest }
+    }
+}
+
+fn encode_punctual(light: &PunctualLight) -> layout::Light {
+    let (kind, cone) = match light.kind {
+        PunctualKind::Point => (codes::LIGHT_POINT, [0.0; 2]),
+        PunctualKind::Spot { inner_angle, outer_angle } => (codes::LIGHT_SPOT, [outer_angle.cos(), inner_angle.cos()]),
+        PunctualKind::Directional { angular_diameter } => {
+            (codes::LIGHT_DIRECTIONAL, [(angular_diameter * 0.5).cos(), 0.0])
+        }
+    };
+    layout::Light {
+        position: light.position.to_array(),
+        edge_1: (light.rotation * Vec3::NEG_Z).to_array(),
+        edge_2: light.intensity.to_array(),
+        kind,
+        cone,
+        ..bytemuck::Zeroable::zeroed()
+    }
+}
+
+/// Watts (times 683 in photometric terms): what the light sends into a scene of this radius in metres.
+fn punctual_power(light: &PunctualLight, reach: f64) -> f64 {
+    use std::f64::consts::PI;
+    let intensity = f64::from(luminance(light.intensity));
+    match light.kind {
+        PunctualKind::Point => 4.0 * PI * intensity,
+        PunctualKind::Spot { outer_angle, .. } => 2.0 * PI * (1.0 - f64::from(outer_angle).cos()) * intensity,
+        PunctualKind::Directional { .. } => PI * reach * reach * intensity,
+    }
+}
+
+fn scene_radius(scene: &Scene) -> f64 {
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    for instance in scene.instances.iter().filter(|i| i.visible) {
+        for &p in &scene.meshes[instance.mesh as usize].positions {
+            let p = instance.world_from_mesh.transform_point3(p);
+            (low, high) = (low.min(p), high.max(p));
+        }
+    }
+    if low.x <= high.x { f64::from((high - low).length()) * 0.5 } else { 1.0 }
+}
+
+fn mean_color(texture: &Texture) -> Vec3 {
+    let decode = |byte: u8| {
+        let c = f32::from(byte) / 255.0;
+        if texture.encoding == crate::scene::TexelEncoding::Linear {
+            c
+        } else if c <= 0.04045 {
+            c / 12.92
+        } else {
+            ((c + 0.055) / 1.055).powf(2.4)
+        }
+    };
+    let table: Vec<f32> = (0..=255).map(decode).collect();
+    let sum = texture.texels.iter().fold(glam::DVec3::ZERO, |sum, t| {
+        sum + Vec3::new(table[t[0] as usize], table[t[1] as usize], table[t[2] as usize]).as_dvec3()
+    });
+    (sum / texture.texels.len().max(1) as f64).as_vec3()
+}
+
+/// Rec. 709 luminance.
+pub fn luminance(rgb: Vec3) -> f32 {
+    rgb.dot(Vec3::new(0.2126, 0.7152, 0.0722))
+}
