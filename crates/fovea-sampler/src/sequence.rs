@@ -1,0 +1,162 @@
+//! Seeded low-discrepancy points by global index: Owen-scrambled Sobol, and independent points for statistics.
+//!
+//! A point is a pure function of `(index, dimension, seed)`, so that a sample does not depend on how the work was cut into
+//! batches. Use: dimensions 0 and 1 choose the direction about the gaze, 2 and 3 the place inside the pixel, the rest the
+//! path.
+//!
+//! # Numerics
+//! Values are `u32` fractions of 2^32; [`to_unit_f32`] keeps the top 24 bits, so that the f32 is exact and below 1. The
+//! index is a `u32`: a stream of more than 2^32 samples changes its seed with the index's high word,
+//! `hash_combine(seed, (index >> 32) as u32)`, which gives a new, independent scramble of the same sequence.
+//!
+//! # Reference
+//! I. M. Sobol, *On the distribution of points in a cube*, 1967; S. Joe, F. Y. Kuo, *Constructing Sobol sequences with
+//! better two-dimensional projections*, SIAM J. Sci. Comput. 30, 2008 (primitive polynomials and initial numbers of
+//! `new-joe-kuo-6`); B. Burley, *Practical hash-based Owen scrambling*, JCGT 9(4), 2020, after S. Laine, T. Karras 2011.
+
+/// Dimensions with direction numbers of their own. Higher dimensions reuse them, on a re-shuffled index.
+pub const DIMENSIONS: usize = 32;
+
+/// Bits of an index and of a value.
+const BITS: usize = 32;
+
+/// Degree, inner coefficients and initial numbers of dimensions 1.. (dimension 0 is van der Corput's), from Joe and Kuo 2008.
+/// Bit `degree - 1 - k` of the coefficients belongs to `x^k` for `0 < k < degree`; the outer coefficients are 1.
+const JOE_KUO: [(u32, u32, &[u32]); DIMENSIONS - 1] = [
+    (1, 0, &[1]),
+    (2, 1, &[1, 3]),
+    (3, 1, &[1, 3, 1]),
+    (3, 2, &[1, 1, 1]),
+    (4, 1, &[1, 1, 3, 3]),
+    (4, 4, &[1, 3, 5, 13]),
+    (5, 2, &[1, 1, 5, 5, 17]),
+    (5, 4, &[1, 1, 5, 5, 5]),
+    (5, 7, &[1, 1, 7, 11, 19]),
+    (5, 11, &[1, 1, 5, 1, 1]),
+    (5, 13, &[1, 1, 1, 3, 11]),
+    (5, 14, &[1, 3, 5, 5, 31]),
+    (6, 1, &[1, 3, 3, 9, 7, 49]),
+    (6, 13, &[1, 1, 1, 15, 21, 21]),
+    (6, 16, &[1, 3, 1, 13, 27, 49]),
+    (6, 19, &[1, 1, 1, 15, 7, 5]),
+    (6, 22, &[1, 3, 1, 15, 13, 25]),
+    (6, 25, &[1, 1, 5, 5, 19, 61]),
+    (7, 1, &[1, 3, 7, 11, 23, 15, 103]),
+    (7, 4, &[1, 3, 7, 13, 13, 15, 69]),
+    (7, 7, &[1, 1, 3, 13, 7, 35, 63]),
+    (7, 8, &[1, 3, 5, 9, 1, 25, 53]),
+    (7, 14, &[1, 3, 1, 13, 9, 35, 107]),
+    (7, 19, &[1, 3, 1, 5, 27, 61, 31]),
+    (7, 21, &[1, 1, 5, 11, 19, 41, 61]),
+    (7, 28, &[1, 3, 5, 3, 3, 13, 69]),
+    (7, 31, &[1, 1, 7, 13, 1, 19, 1]),
+    (7, 32, &[1, 3, 7, 5, 13, 19, 59]),
+    (7, 37, &[1, 1, 3, 9, 25, 29, 41]),
+    (7, 41, &[1, 3, 5, 13, 23, 1, 55]),
+    (7, 42, &[1, 3, 7, 3, 13, 59, 17]),
+];
+
+/// The direction numbers of every dimension, row-major: `[dimension * 32 + bit of the index]`, most significant bit first.
+#[must_use]
+pub fn direction_numbers() -> Vec<u32> {
+    let mut numbers = Vec::with_capacity(DIMENSIONS * BITS);
+    numbers.extend((0..BITS).map(|bit| 1u32 << (31 - bit)));
+    for (degree, coefficients, initial) in JOE_KUO {
+        let degree = degree as usize;
+        let start = numbers.len();
+        for bit in 0..BITS {
+            let number = if bit < degree {
+                initial[bit] << (31 - bit)
+            } else {
+                let before = |k: usize| numbers[start + bit - k];
+                (1..degree)
+                    .filter(|k| (coefficients >> (degree - 1 - k)) & 1 == 1)
+                    .fold(before(degree) ^ (before(degree) >> degree), |number, k| number ^ before(k))
+            };
+            numbers.push(number);
+        }
+    }
+    numbers
+}
+
+/// The matrix, computed once.
+fn matrix() -> &'static [u32] {
+    static MATRIX: std::sync::OnceLock<Vec<u32>> = std::sync::OnceLock::new();
+    MATRIX.get_or_init(direction_numbers)
+}
+
+/// The unscrambled Sobol value, a fraction of 2^32. `dimension` is taken modulo [`DIMENSIONS`].
+#[must_use]
+pub fn sobol(index: u32, dimension: u32) -> u32 {
+    let row = (dimension as usize % DIMENSIONS) * BITS;
+    let mut rest = index;
+    let mut value = 0;
+    for number in &matrix()[row..row + BITS] {
+        value ^= number & 0u32.wrapping_sub(rest & 1);
+        rest >>= 1;
+    }
+    value
+}
+
+/// The Owen-scrambled Sobol value of `dimension` at `index`, a fraction of 2^32.
+///
+/// Dimensions below [`DIMENSIONS`] are those of one sequence. Block `b = dimension / DIMENSIONS` above uses the same
+/// sequence on the index scrambled by `b`: well distributed within a block, independent between blocks.
+#[must_use]
+pub fn sobol_owen(index: u32, dimension: u32, seed: u32) -> u32 {
+    let block = dimension / DIMENSIONS as u32;
+    // A nested permutation of the index keeps every aligned power-of-two run together as a set.
+    let index = if block == 0 { index } else { owen_scramble(index, hash_combine(seed, !block)) };
+    owen_scramble(sobol(index, dimension), hash_combine(seed, dimension))
+}
+
+/// Independent points: a hash of `(index, dimension, seed)`, a fraction of 2^32. For statistics and as the baseline.
+#[must_use]
+pub fn independent(index: u32, dimension: u32, seed: u32) -> u32 {
+    hash_combine(hash_combine(seed, dimension), index)
+}
+
+/// Nested uniform scrambling in base 2: bit `k` is flipped by a hash of the bits above it, so that every elementary
+/// interval stays one.
+#[must_use]
+pub fn owen_scramble(value: u32, seed: u32) -> u32 {
+    let mut x = value.reverse_bits();
+    x = x.wrapping_add(seed);
+    x ^= x.wrapping_mul(0x6c50_b47c);
+    x ^= x.wrapping_mul(0xb82f_1e52);
+    x ^= x.wrapping_mul(0xc7af_e638);
+    x ^= x.wrapping_mul(0x8d22_f6e6);
+    x.reverse_bits()
+}
+
+/// A hash of two words.
+#[must_use]
+pub fn hash_combine(a: u32, b: u32) -> u32 {
+    hash(a ^ hash(b.wrapping_add(0x9e37_79b9)))
+}
+
+/// A bijective integer hash with low bias (constants of C. Wellons' search, 2018, public domain).
+#[must_use]
+pub fn hash(value: u32) -> u32 {
+    let mut x = value;
+    x ^= x >> 16;
+    x = x.wrapping_mul(0x7feb_352d);
+    x ^= x >> 15;
+    x = x.wrapping_mul(0x846c_a68b);
+    x ^ (x >> 16)
+}
+
+/// The f32 in `[0, 1)` of a fraction of 2^32: its top 24 bits, exactly.
+#[must_use]
+pub fn to_unit_f32(value: u32) -> f32 {
+    (value >> 8) as f32 * (1.0 / 16_777_216.0)
+}
+
+/// The index offset that thread `thread` of a batch of `2^log2_batch` samples should trace, so that neighbouring threads lie
+/// in neighbouring strata of dimension 0 (rings about the gaze): the bit reversal of `thread` in `log2_batch` bits.
+///
+/// The batch must start at a multiple of its size; the set of indices is the batch's whatever the order.
+#[must_use]
+pub fn strata_order(thread: u32, log2_batch: u32) -> u32 {
+    if log2_batch == 0 { 0 } else { thread.reverse_bits() >> (32 - log2_batch.min(32)) }
+}
