@@ -15,6 +15,7 @@
 //! - Without any light, a neutral sky lights the scene and the report says so.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -120,10 +121,11 @@ fn import_document(
     let walk = graph::Walk { data: &data, roots, time_secs: options.time_secs, variant };
     let graph = walk.run(
         |index, warnings| {
-            if !materials.contains_key(&index) {
-                materials.insert(index, material::parse(&document, index, &mut table, warnings)?);
-            }
-            Ok(material::tangent_uv_set(&materials[&index]))
+            let material = match materials.entry(index) {
+                Entry::Occupied(entry) => entry.into_mut(),
+                Entry::Vacant(entry) => entry.insert(material::parse(&document, index, &mut table, warnings)?),
+            };
+            Ok(material::tangent_uv_set(material))
         },
         &mut report.warnings,
     )?;
@@ -134,11 +136,11 @@ fn import_document(
     );
     report.stage_seconds.geometry = geometry_secs;
     report.stage_seconds.textures = texture_secs;
-    let (textures, warnings, files) = textures?;
-    report.files.extend(files);
-    let parts = assemble::Parts { name, graph, built: meshes?, materials, textures };
+    let decoded = textures?;
+    report.files.extend(decoded.files);
+    let parts = assemble::Parts { name, graph, built: meshes?, materials, textures: decoded.textures };
     let scene = parts.assemble(&document, &mut report)?;
-    report.warnings.extend(warnings);
+    report.warnings.extend(decoded.warnings);
     report.stage_seconds.total = start.elapsed().as_secs_f64();
     Ok((scene, report))
 }

@@ -39,9 +39,15 @@ impl JointMatrices {
     }
 }
 
+/// Four joints and weights per vertex.
+struct InfluenceSet {
+    joints: Vec<[u32; 4]>,
+    weights: Vec<[f32; 4]>,
+}
+
 /// Up to eight joints and weights per vertex.
 pub(super) struct Influences {
-    sets: Vec<(Vec<[u32; 4]>, Vec<[f32; 4]>)>,
+    sets: Vec<InfluenceSet>,
 }
 
 impl Influences {
@@ -51,14 +57,17 @@ impl Influences {
             let (joints, weights) = (format!("JOINTS_{set}"), format!("WEIGHTS_{set}"));
             let accessors = (primitive.attributes.get(&joints), primitive.attributes.get(&weights));
             let (Some(&joint_accessor), Some(&weight_accessor)) = accessors else { continue };
-            let values = (data.integers::<4>(joint_accessor, &joints)?, data.floats::<4>(weight_accessor, &weights)?);
-            for (attribute, found) in [(joints, values.0.len()), (weights, values.1.len())] {
+            let set = InfluenceSet {
+                joints: data.integers::<4>(joint_accessor, &joints)?,
+                weights: data.floats::<4>(weight_accessor, &weights)?,
+            };
+            for (attribute, found) in [(joints, set.joints.len()), (weights, set.weights.len())] {
                 if found != vertices {
                     let cause = ContentError::AttributeCount { attribute, found, expected: vertices };
                     return Err(Fault::new(primitive.place.clone(), cause));
                 }
             }
-            sets.push(values);
+            sets.push(set);
         }
         Ok(Self { sets })
     }
@@ -66,8 +75,8 @@ impl Influences {
     /// The weighted mean of the joints' matrices; the first joint's where a vertex has no weight.
     pub(super) fn blend(&self, vertex: usize, joints: &JointMatrices, place: &str) -> Result<DAffine3, Fault> {
         let (mut linear, mut translation, mut total) = (DMat3::ZERO, DVec3::ZERO, 0.0);
-        for (set_joints, set_weights) in &self.sets {
-            for (&joint, &weight) in set_joints[vertex].iter().zip(&set_weights[vertex]) {
+        for set in &self.sets {
+            for (&joint, &weight) in set.joints[vertex].iter().zip(&set.weights[vertex]) {
                 if !(weight.is_finite() && weight > 0.0) {
                     continue;
                 }

@@ -65,6 +65,14 @@ impl TextureUse {
     }
 }
 
+/// The textures of a scene and what their making met.
+pub(super) struct Decoded {
+    pub(super) textures: Vec<Arc<Texture>>,
+    pub(super) warnings: Vec<ImportWarning>,
+    /// The image files that were read.
+    pub(super) files: Vec<PathBuf>,
+}
+
 /// The textures that the materials ask for, in order of request.
 #[derive(Default)]
 pub(super) struct TextureTable {
@@ -82,11 +90,7 @@ impl TextureTable {
     }
 
     /// Decodes what was asked for, in parallel. Missing and undecodable images become neutral texels and warnings.
-    pub(super) fn decode(
-        &self,
-        data: &Data<'_>,
-        folder: &Folder,
-    ) -> Result<(Vec<Arc<Texture>>, Vec<ImportWarning>, Vec<PathBuf>), Fault> {
+    pub(super) fn decode(&self, data: &Data<'_>, folder: &Folder) -> Result<Decoded, Fault> {
         let mut uses_of_image: Vec<(usize, Vec<usize>)> = Vec::new();
         let mut slot_of_image = HashMap::new();
         for (index, &(image, _)) in self.requests.iter().enumerate() {
@@ -112,7 +116,7 @@ impl TextureTable {
             warnings.extend(image_warnings);
             files.extend(data.document.images[image.0].uri.and_then(|uri| folder.companion(uri)));
         }
-        Ok((textures.into_iter().flatten().collect(), warnings, files))
+        Ok(Decoded { textures: textures.into_iter().flatten().collect(), warnings, files })
     }
 
     fn decode_image(
