@@ -81,6 +81,12 @@ impl Inverse {
         &self.name
     }
 
+    /// The share of the range `[0, 1]` that stays within the cap: below 1 where the distribution has a floor beyond it.
+    #[must_use]
+    pub fn share_within_cap(&self) -> f64 {
+        self.tail.as_ref().map_or(1.0, |tail| tail.joint)
+    }
+
     /// The geometry of its distribution.
     #[must_use]
     pub fn geometry(&self) -> Geometry {

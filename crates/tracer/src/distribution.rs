@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use fovea_sampler::inverse::Inverse;
+use fovea_sampler::Inverse;
 use glam::{Mat3, Quat, Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -121,8 +121,7 @@ impl Distribution {
 
     /// Foveated (FV): by visual acuity about the gaze.
     pub fn foveated(gaze: Gaze, clip: Option<Clip>, inverse: Arc<Inverse>) -> Self {
-        let distribution = inverse.distribution();
-        let capped = distribution.map_or(1.0, |d| 1.0 / (1.0 + d.outer_ratio()));
+        let capped = inverse.share_within_cap();
         let mut layers = Vec::new();
         let mut push = |weight: f64, view: Option<View>| {
             if weight <= 0.0 {

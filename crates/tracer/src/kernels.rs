@@ -2,7 +2,7 @@
 
 use std::{borrow::Cow, fmt, sync::OnceLock};
 
-use fovea_sampler::{inverse::Inverse, sequence};
+use fovea_sampler::{Inverse, sequence};
 use thiserror::Error;
 use wesl::{CompileOptions, ModulePath, VirtualResolver, Wesl};
 
@@ -139,7 +139,8 @@ impl SamplerModule {
             fovea_sampler::wgsl::radial_module(inverse),
             fovea_sampler::wgsl::sequence_module()
         );
-        Self { name: inverse.name().to_string(), text }
+        let name = inverse.name().replace(|c: char| !c.is_ascii_alphanumeric(), "-");
+        Self { name, text }
     }
 }
 

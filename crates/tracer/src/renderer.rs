@@ -582,11 +582,9 @@ fn trace_groups(
     scene: &SceneOnGpu,
     batch: [&wgpu::Buffer; 4],
 ) -> [Option<wgpu::BindGroup>; 2] {
-    let numbered = |(index, buffer): (usize, &&wgpu::Buffer)| (index as u32, buffer.as_entire_binding());
-    let first: Vec<_> = batch.iter().enumerate().map(numbered).collect();
-    let mut second: Vec<_> =
-        scene.bindings.buffers.iter().enumerate().map(|(i, b)| (i as u32, b.as_entire_binding())).collect();
-    let textures = scene.bindings.textures.iter().enumerate();
-    second.extend(textures.map(|(i, t)| (8 + i as u32, wgpu::BindingResource::TextureView(t))));
+    let first: Vec<_> = (0..).zip(batch.map(wgpu::Buffer::as_entire_binding)).collect();
+    let buffers = scene.bindings.buffers.iter().map(wgpu::Buffer::as_entire_binding);
+    let textures = scene.bindings.textures.iter().map(wgpu::BindingResource::TextureView);
+    let second: Vec<_> = (0..).zip(buffers.chain(textures)).collect();
     [kernel.bind(device, 0, &first), kernel.bind(device, 1, &second)]
 }

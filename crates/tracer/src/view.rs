@@ -219,11 +219,16 @@ impl ViewRenderer {
                 push.dispatch(&mut pass, &[&group], tiles(fine.size));
             }
         }
-        let finished = pyramid.slice(..u64::from(settings.size[0]) * u64::from(settings.size[1]) * 16);
+        let finished_bytes = u64::from(settings.size[0]) * u64::from(settings.size[1]) * 16;
+        let finished = wgpu::BufferBinding {
+            buffer: pyramid,
+            offset: 0,
+            size: wgpu::BufferSize::new(finished_bytes),
+        };
         let group = present.bind(
             device,
             0,
-            &[(0, upload(base).as_entire_binding()), (1, wgpu::BindingResource::Buffer(finished.into()))],
+            &[(0, upload(base).as_entire_binding()), (1, wgpu::BindingResource::Buffer(finished))],
         );
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some(present.label()),
