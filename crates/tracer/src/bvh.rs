@@ -1,15 +1,14 @@
 //! Two-level bounding volume hierarchy: one obvhs CWBVH per mesh, one over the instances.
 
-use glam::{Affine3A, Vec3A};
+use std::sync::Arc;
+
+use glam::{Affine3A, Vec3, Vec3A};
 use obvhs::{
     BvhBuildParams,
     aabb::Aabb,
     cwbvh::{CwBvh, builder::build_cwbvh, node::CwBvhNode},
     triangle::Triangle,
 };
-use rayon::prelude::*;
-
-use crate::scene::{Mesh, Scene};
 
 /// Bytes of a node on the GPU.
 pub const NODE_BYTES: usize = size_of::<CwBvhNode>();
@@ -19,7 +18,7 @@ pub const NODE_BYTES: usize = size_of::<CwBvhNode>();
 pub struct Blas {
     /// Indices of children and primitives count from zero.
     pub nodes: Vec<CwBvhNode>,
-    /// Leaf order to index in [`Mesh::triangles`].
+    /// Leaf order to index of the triangle it was built from.
     pub triangle_order: Vec<u32>,
     /// Bounds in mesh space.
     pub bounds: Aabb,
@@ -32,20 +31,30 @@ pub struct Blas {
 pub struct Tlas {
     /// Indices of children and primitives count from zero.
     pub nodes: Vec<CwBvhNode>,
-    /// Leaf order to index in [`Scene::instances`].
-    pub instance_order: Vec<u32>,
+    /// Leaf order to index of the entry it was built from.
+    pub order: Vec<u32>,
     /// Levels of nodes, at least 1.
     pub depth: u32,
 }
 
+/// A hierarchy placed in the world.
+#[derive(Clone, Debug)]
+pub struct TlasEntry {
+    /// Placement.
+    pub world_from_mesh: Affine3A,
+    /// What is placed.
+    pub blas: Arc<Blas>,
+    /// The scene's instance; `None` for the static mesh.
+    pub source: Option<u32>,
+}
+
 impl Blas {
-    /// Builds the hierarchy of a mesh. Triangles are not split, so each appears once.
-    pub fn build(mesh: &Mesh) -> Self {
-        let triangles: Vec<Triangle> = mesh
-            .triangles
+    /// Builds the hierarchy of an indexed triangle list. Triangles are not split, so each appears once.
+    pub fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        let triangles: Vec<Triangle> = triangles
             .iter()
             .map(|corners| {
-                let [v0, v1, v2] = corners.map(|i| Vec3A::from(mesh.positions[i as usize]));
+                let [v0, v1, v2] = corners.map(|i| Vec3A::from(positions[i as usize]));
                 Triangle { v0, v1, v2 }
             })
             .collect();
@@ -55,23 +64,15 @@ impl Blas {
 }
 
 impl Tlas {
-    /// Builds the hierarchy over the visible instances; `blas` has one entry per mesh of the scene.
-    pub fn build(scene: &Scene, blas: &[std::sync::Arc<Blas>]) -> Self {
-        let visible: Vec<u32> =
-            (0..scene.instances.len() as u32).filter(|&i| scene.instances[i as usize].visible).collect();
-        if visible.is_empty() {
-            return Self { nodes: vec![CwBvhNode::default()], instance_order: Vec::new(), depth: 1 };
+    /// Builds the hierarchy over placed ones.
+    pub fn build(entries: &[TlasEntry]) -> Self {
+        if entries.is_empty() {
+            return Self { nodes: vec![CwBvhNode::default()], order: Vec::new(), depth: 1 };
         }
-        let bounds: Vec<Aabb> = visible
-            .par_iter()
-            .map(|&i| {
-                let instance = &scene.instances[i as usize];
-                transformed_bounds(&blas[instance.mesh as usize].bounds, &instance.world_from_mesh)
-            })
-            .collect();
+        let bounds: Vec<Aabb> =
+            entries.iter().map(|entry| transformed_bounds(&entry.blas.bounds, &entry.world_from_mesh)).collect();
         let bvh = build_cwbvh(&bounds, build_params(), &mut std::time::Duration::default());
-        let instance_order = bvh.primitive_indices.iter().map(|&i| visible[i as usize]).collect();
-        Self { depth: depth(&bvh), nodes: bvh.nodes, instance_order }
+        Self { depth: depth(&bvh), nodes: bvh.nodes, order: bvh.primitive_indices }
     }
 }
 

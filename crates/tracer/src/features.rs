@@ -24,6 +24,8 @@ macro_rules! features {
 }
 
 features! {
+    /// Some mesh is placed often and has a hierarchy of its own below an upper level.
+    Instances = "INSTANCES",
     /// Some instance has alpha mask or blend: candidates pass an alpha test.
     Alpha = "ALPHA",
     /// Some material has a texture.

@@ -118,8 +118,8 @@ pub struct KernelKey {
 pub struct KernelConstants {
     /// Entries of the traversal stack: enough for the depth of the hierarchies.
     pub stack_size: u32,
-    /// Node index of the upper level's root.
-    pub tlas_root: u32,
+    /// Node that traversal starts at.
+    pub root_node: u32,
     /// Cells of the environment's importance grid.
     pub environment_cells: [u32; 2],
 }
@@ -205,7 +205,7 @@ fn constants_module(c: &KernelConstants) -> String {
         ("FIRST_ROULETTE_BOUNCE", FIRST_ROULETTE_BOUNCE),
         ("SOBOL_DIMENSIONS", sequence::DIMENSIONS as u32),
         ("STACK_SIZE", c.stack_size.max(1)),
-        ("TLAS_ROOT", c.tlas_root),
+        ("ROOT_NODE", c.root_node),
         ("ENVIRONMENT_CELLS_X", c.environment_cells[0].max(1)),
         ("ENVIRONMENT_CELLS_Y", c.environment_cells[1].max(1)),
     ];

@@ -10,6 +10,7 @@
 pub mod import;
 pub mod scene;
 pub mod bvh;
+pub mod coherence;
 pub mod distribution;
 pub mod features;
 pub mod film;

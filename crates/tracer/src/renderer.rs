@@ -6,6 +6,7 @@ use glam::{Mat3, Quat, Vec3};
 use thiserror::Error;
 
 use crate::{
+    coherence::order_columns,
     distribution::Distribution,
     features::Feature,
     film::{Film, FilmMapping, FilmOptions, FilmSnapshot, ReadError},
@@ -308,19 +309,29 @@ impl Renderer {
         &self.gpu
     }
 
-    /// Records and submits one batch of at most [`LARGEST_BATCH`] samples; does not wait.
+    /// Records and submits one batch of at most `samples` samples and returns how many; does not wait.
+    ///
+    /// Batches are powers of two, aligned in the sequence, up to [`LARGEST_BATCH`]: the first after a restart can have
+    /// any such size, the next at most as many as are done already, and so on.
     ///
     /// # Errors
     /// When there is no scene.
-    pub fn trace(&mut self, samples: u32) -> Result<(), RenderError> {
-        let samples = samples.min(LARGEST_BATCH);
+    pub fn trace(&mut self, samples: u32) -> Result<u32, RenderError> {
+        let samples = self.next_batch(samples);
         self.write_params(samples)?;
         let bound = self.bound.as_ref().ok_or(RenderError::NoScene)?;
         let mut encoder = self.encoder("batch");
         bound.record(&mut encoder, samples);
         self.gpu.queue.submit([encoder.finish()]);
         self.samples += u64::from(samples);
-        Ok(())
+        Ok(samples)
+    }
+
+    fn next_batch(&self, wanted: u32) -> u32 {
+        let first = self.first_sample + self.samples;
+        let aligned = if first == 0 { LARGEST_BATCH } else { 1 << first.trailing_zeros().min(LARGEST_BATCH.ilog2()) };
+        let wanted = wanted.clamp(1, LARGEST_BATCH);
+        aligned.min(1 << wanted.ilog2())
     }
 
     /// Traces until `stop`, in batches of about a tenth of a second; `progress` hears the fraction done after each and
@@ -346,10 +357,10 @@ impl Renderer {
                 return Ok(started.elapsed().as_secs_f64());
             }
             let batch_started = Instant::now();
-            self.trace(batch)?;
+            let traced = self.trace(batch)?;
             self.gpu.wait().map_err(|_| RenderError::DeviceLost)?;
             let growth = (target / batch_started.elapsed().as_secs_f64().max(1e-6)).clamp(0.5, 2.0);
-            batch = ((f64::from(batch) * growth) as u32).clamp(1024, LARGEST_BATCH) & !63;
+            batch = ((f64::from(traced) * growth) as u32).clamp(1 << 10, LARGEST_BATCH);
         }
     }
 
@@ -456,6 +467,9 @@ impl Renderer {
         let (layers, layer_count, _) = self.distribution.encode();
         let first = self.first_sample + self.samples;
         let (radiance_scale, luminance_scale) = self.film_scales();
+        let columns = order_columns(samples.max(1).ilog2());
+        let mut order = [[0; 4]; 5];
+        bytemuck::cast_slice_mut::<_, u32>(&mut order).copy_from_slice(&columns);
         for (slab, buffer) in self.film.slabs.iter().zip(&self.params) {
             let params = BatchParams {
                 first_index_low: first as u32,
@@ -477,6 +491,7 @@ impl Renderer {
                 luminance_scale,
                 layer_count,
                 use_sobol: u32::from(self.options.sequence == SequenceKind::Sobol),
+                order,
                 layers,
             };
             self.gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&params));

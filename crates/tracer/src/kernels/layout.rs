@@ -91,6 +91,7 @@ shared! {
         luminance_scale: f32,
         layer_count: u32,
         use_sobol: u32,
+        order: [[u32; 4]; 5],
         layers: [SampleLayer; MAX_LAYERS],
     }
 
@@ -99,7 +100,8 @@ shared! {
         radiance: [f32; 3],
         pixel: u32,
         rays: u32,
-        pad_0: [u32; 3],
+        index: u32,
+        pad_0: [u32; 2],
     }
 
     /// A mesh placed in the world.
@@ -109,21 +111,20 @@ shared! {
         root_node: u32,
         material: u32,
         first_light: u32,
-        first_triangle: u32,
         flags: u32,
-        first_vertex: u32,
-        unused_0: u32,
-        unused_1: u32,
     }
 
     /// Shading attributes of a vertex.
     struct Vertex {
         normal: u32,
         tangent: u32,
-        uv0: [f32; 2],
-        uv1: [f32; 2],
+        u0: f32,
+        v0: f32,
+        u1: f32,
+        v1: f32,
         color_rg: u32,
         color_ba: u32,
+        part: u32,
     }
 
     /// A material.
@@ -173,13 +174,6 @@ shared! {
         unused: u32,
         cone: [f32; 2],
         unused_2: [f32; 2],
-    }
-
-    /// A cell of the environment's importance grid.
-    struct EnvironmentCell {
-        density: f32,
-        alias_threshold: f32,
-        alias_index: u32,
     }
 
     /// Sums over the film's lifetime.
@@ -241,6 +235,7 @@ pub mod codes {
     pub const NONE: u32 = u32::MAX;
     pub const INSTANCE_MIRRORED: u32 = 1;
     pub const INSTANCE_ALPHA: u32 = 2;
+    pub const INSTANCE_STATIC: u32 = 4;
     pub const MATERIAL_DOUBLE_SIDED: u32 = 1;
     pub const MATERIAL_ALPHA_MASK: u32 = 2;
     pub const MATERIAL_ALPHA_BLEND: u32 = 4;

@@ -7,7 +7,6 @@ use glam::Vec3;
 use super::{AliasTable, lights::luminance};
 use crate::{
     gpu::Gpu,
-    kernels::layout,
     scene::{Environment, EnvironmentImage},
 };
 
@@ -18,8 +17,8 @@ const MOST_CELLS: [u32; 2] = [1024, 512];
 pub struct EnvironmentOnGpu {
     /// The image, or one black texel.
     pub image: wgpu::TextureView,
-    /// The grid, row by row; empty for a constant environment.
-    pub cells: Vec<layout::EnvironmentCell>,
+    /// The grid: density per unit of the unit square, alias threshold, alias index (its bits); or one texel.
+    pub cells: wgpu::TextureView,
     /// Its size; zero for a constant environment.
     pub cells_size: [u32; 2],
     /// Constant radiance, or the factor of the image.
@@ -36,7 +35,7 @@ impl EnvironmentOnGpu {
         match environment {
             Environment::Constant(radiance) => Self {
                 image: upload_image(gpu, 1, 1, &[[0.0; 4]]),
-                cells: Vec::new(),
+                cells: upload_image(gpu, 1, 1, &[[0.0; 4]]),
                 cells_size: [0; 2],
                 radiance: *radiance,
                 rotation_turns: 0.0,
@@ -44,12 +43,12 @@ impl EnvironmentOnGpu {
             },
             Environment::Image { image, rotation_deg, intensity } => {
                 let texels: Vec<[f32; 4]> = image.pixels.iter().map(|p| [p[0], p[1], p[2], 1.0]).collect();
-                *bytes += texels.len() as u64 * 16;
                 let (cells, cells_size) = importance_grid(image);
+                *bytes += (texels.len() + cells.len()) as u64 * 16;
                 let brightest = image.pixels.iter().flatten().fold(0.0f32, |a, &b| a.max(b)) * intensity;
                 Self {
                     image: upload_image(gpu, image.width, image.height, &texels),
-                    cells,
+                    cells: upload_image(gpu, cells_size[0], cells_size[1], &cells),
                     cells_size,
                     radiance: Vec3::splat(*intensity),
                     rotation_turns: rotation_deg / 360.0,
@@ -83,7 +82,7 @@ fn upload_image(gpu: &Gpu, width: u32, height: u32, texels: &[[f32; 4]]) -> wgpu
 
 /// Cells weighted by luminance and solid angle. A cell's luminance is the mean over the pixels within half a pixel of
 /// it, so that bilinear interpolation shows nothing that the grid gives no density to.
-fn importance_grid(image: &EnvironmentImage) -> (Vec<layout::EnvironmentCell>, [u32; 2]) {
+fn importance_grid(image: &EnvironmentImage) -> (Vec<[f32; 4]>, [u32; 2]) {
     let size = [image.width.min(MOST_CELLS[0]), image.height.min(MOST_CELLS[1])];
     let at = |x: i64, y: i64| {
         let column = x.rem_euclid(i64::from(image.width));
@@ -104,11 +103,7 @@ fn importance_grid(image: &EnvironmentImage) -> (Vec<layout::EnvironmentCell>, [
     let table = AliasTable::build(&weights);
     let count = weights.len() as f32;
     let cells = (0..weights.len())
-        .map(|i| layout::EnvironmentCell {
-            density: table.probabilities[i] * count,
-            alias_threshold: table.thresholds[i],
-            alias_index: table.aliases[i],
-        })
+        .map(|i| [table.probabilities[i] * count, table.thresholds[i], f32::from_bits(table.aliases[i]), 0.0])
         .collect();
     (cells, size)
 }

@@ -1,41 +1,35 @@
 //! The light table: every emissive triangle and punctual light, weighted by power.
 
-use std::sync::Arc;
-
 use glam::Vec3;
 
-use super::AliasTable;
+use super::{AliasTable, geometry::Geometry};
 use crate::{
-    bvh::Blas,
     kernels::layout::{self, codes},
     scene::{PunctualKind, PunctualLight, Scene, Texture},
 };
 
 /// Lights with their alias rows.
-pub struct LightTable {
-    /// Emissive triangles in the leaf order of their instances, then punctual lights.
+pub(super) struct LightTable {
+    /// Emissive triangles by instance, in the order of its mesh, then punctual lights.
     pub lights: Vec<layout::Light>,
-    /// Index of the first light of each instance in TLAS order, or `NONE`.
-    pub first_lights: Vec<u32>,
     /// Largest radiance of a source that is seen; punctual lights count by their effect at a metre.
     pub brightest: f32,
 }
 
 impl LightTable {
-    /// Builds the table of a scene's visible lights.
-    pub fn build(scene: &Scene, instance_order: &[u32], blas: &[Arc<Blas>], first_triangles: &[u32]) -> Self {
+    /// Builds the table of a scene's visible lights and enters each instance's first light into `geometry`.
+    pub(super) fn build(scene: &Scene, geometry: &mut Geometry) -> Self {
         let mut lights = Vec::new();
         let mut powers = Vec::new();
-        let mut first_lights = Vec::with_capacity(instance_order.len());
         let mut brightest: f32 = 0.0;
-        for (tlas_index, &index) in instance_order.iter().enumerate() {
-            let instance = &scene.instances[index as usize];
+        for (index, source) in geometry.sources.iter().enumerate() {
+            let Some(source) = *source else { continue };
+            let instance = &scene.instances[source as usize];
             let material = &scene.materials[instance.material as usize];
             if material.emission.max_element() <= 0.0 || material.unlit {
-                first_lights.push(codes::NONE);
                 continue;
             }
-            first_lights.push(lights.len() as u32);
+            geometry.instances[index].first_light = lights.len() as u32;
             brightest = brightest.max(material.emission.max_element());
             let mean = material
                 .emissive_texture
@@ -44,10 +38,13 @@ impl LightTable {
             // Black texels in a dark texture still must be reachable where its mean is not zero elsewhere.
             let radiance = f64::from(luminance(material.emission * mean.max(Vec3::splat(1e-4)))) * sides;
             let mesh = &scene.meshes[instance.mesh as usize];
-            let order = &blas[instance.mesh as usize].triangle_order;
-            for (leaf, &triangle) in order.iter().enumerate() {
-                let [a, b, c] = mesh.triangles[triangle as usize]
-                    .map(|v| instance.world_from_mesh.transform_point3(mesh.positions[v as usize]));
+            let is_mirrored = instance.world_from_mesh.matrix3.determinant() < 0.0;
+            for triangle in &mesh.triangles {
+                let [a, mut b, mut c] =
+                    triangle.map(|v| instance.world_from_mesh.transform_point3(mesh.positions[v as usize]));
+                if is_mirrored {
+                    std::mem::swap(&mut b, &mut c);
+                }
                 let (edge_1, edge_2) = (b - a, c - a);
                 powers.push(radiance * std::f64::consts::PI * 0.5 * edge_1.as_dvec3().cross(edge_2.as_dvec3()).length());
                 lights.push(layout::Light {
@@ -55,11 +52,14 @@ impl LightTable {
                     edge_1: edge_1.to_array(),
                     edge_2: edge_2.to_array(),
                     kind: codes::LIGHT_TRIANGLE,
-                    instance: tlas_index as u32,
-                    triangle: first_triangles[instance.mesh as usize] + leaf as u32,
+                    instance: index as u32,
+                    triangle: codes::NONE,
                     ..bytemuck::Zeroable::zeroed()
                 });
             }
+        }
+        if scene.materials.iter().any(|m| m.emissive_texture.is_some()) {
+            enter_triangles(geometry, &mut lights);
         }
         let reach = scene_radius(scene);
         for light in scene.lights.iter().filter(|light| light.intensity.max_element() > 0.0) {
@@ -73,7 +73,32 @@ impl LightTable {
             light.alias_threshold = table.thresholds[i];
             light.alias_index = table.aliases[i];
         }
-        Self { lights, first_lights, brightest }
+        Self { lights, brightest }
+    }
+}
+
+/// Tells each light the triangle whose texture coordinates it has. A mesh that is placed often lends its copies one.
+fn enter_triangles(geometry: &Geometry, lights: &mut [layout::Light]) {
+    let mut entries: Vec<(u32, u32)> = Vec::new();
+    for (index, instance) in geometry.instances.iter().enumerate() {
+        if instance.root_node != codes::NONE && instance.first_light != codes::NONE {
+            entries.push((instance.root_node, index as u32));
+        }
+    }
+    for (slot, &[first, _, _, number]) in geometry.triangles.iter().enumerate() {
+        let part = geometry.vertices[first as usize].part;
+        if part != codes::NONE {
+            let first_light = geometry.instances[part as usize].first_light;
+            if first_light != codes::NONE {
+                lights[(first_light + number) as usize].triangle = slot as u32;
+            }
+        }
+    }
+    for (root, index) in entries {
+        let first_light = geometry.instances[index as usize].first_light;
+        for (number, slot) in geometry.slots_below(root) {
+            lights[(first_light + number) as usize].triangle = slot;
+        }
     }
 }
 
@@ -136,6 +161,6 @@ fn mean_color(texture: &Texture) -> Vec3 {
 }
 
 /// Rec. 709 luminance.
-pub fn luminance(rgb: Vec3) -> f32 {
+pub(super) fn luminance(rgb: Vec3) -> f32 {
     rgb.dot(Vec3::new(0.2126, 0.7152, 0.0722))
 }
