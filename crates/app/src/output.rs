@@ -102,7 +102,7 @@ pub fn write_atomically(
 
 /// A name in `folder` for a picture of `scene` that no file has yet: `scene-1.png`, `scene-2.png` and so on.
 pub fn free_name(folder: &Path, scene: &str, extension: &str) -> PathBuf {
-    let stem = scene.rsplit_once('.').map_or(scene, |(stem, _)| stem);
+    let stem = scene.strip_suffix(".glb").or_else(|| scene.strip_suffix(".gltf")).unwrap_or(scene);
     // A scene's name may hold anything; a file's name may not.
     let stem: String = stem.chars().map(|c| if c.is_alphanumeric() || "-_. ".contains(c) { c } else { '_' }).collect();
     let name = |number: u64| folder.join(format!("{stem}-{number}.{extension}"));
