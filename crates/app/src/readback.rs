@@ -24,17 +24,25 @@ pub fn picture_texture(gpu: &Gpu, size: [u32; 2]) -> wgpu::Texture {
     })
 }
 
+/// Finds out whether the adapter can hold a picture of this size.
+///
+/// # Errors
+/// When it cannot.
+pub fn check_size(gpu: &Gpu, [width, height]: [u32; 2]) -> anyhow::Result<()> {
+    let limit = gpu.device.limits().max_texture_dimension_2d;
+    if width == 0 || height == 0 || width.max(height) > limit {
+        bail!("a picture of {width}x{height} pixels is beyond adapter {}'s limit of {limit} a side", gpu.info().name);
+    }
+    Ok(())
+}
+
 /// Draws a view of the film and reads it back, row by row from the top.
 ///
 /// # Errors
 /// When the picture is larger than the adapter's textures, a kernel does not compile, or the device is lost.
 pub fn draw(renderer: &mut Renderer, settings: &ViewSettings) -> anyhow::Result<Vec<[u8; 4]>> {
     let gpu = renderer.gpu().clone();
-    let limit = gpu.device.limits().max_texture_dimension_2d;
-    if settings.size.iter().any(|&side| side == 0 || side > limit) {
-        let [width, height] = settings.size;
-        bail!("a picture of {width}x{height} pixels is beyond adapter {}'s limit of {limit}", gpu.info().name);
-    }
+    check_size(&gpu, settings.size)?;
     let texture = picture_texture(&gpu, settings.size);
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("picture") });
     renderer.present(

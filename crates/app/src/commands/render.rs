@@ -50,6 +50,9 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
 
     let gpu = Gpu::headless(&args.scene.adapter.clone().map_or(AdapterSelect::Auto, AdapterSelect::Named))?;
     let film = film_options(args.film, camera);
+    if format == ImageFormat::Png {
+        readback::check_size(&gpu, [film.width, film.height])?;
+    }
     let pose = FilmPose { position: camera.position, world_from_film: world_from_film(args, camera) };
     let aim = aim(args, &film, pose.world_from_film);
     let inverse = args.sampling.acuity().inverse()?;
