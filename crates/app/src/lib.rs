@@ -1,1 +1,18 @@
-//! Placeholder.
+//! Foveated progressive preview of glTF scenes: the desktop window and the headless commands of `fovea`.
+//!
+//! The renderer is the crate `tracer`; this crate turns command lines, pointers and windows into its settings, and its
+//! films into pictures.
+//!
+//! Angles are radians unless a name ends in `_deg`; degrees appear at the command line and on screen only.
+
+pub mod cli;
+pub mod commands;
+pub mod film;
+pub mod output;
+pub mod preview;
+pub mod readback;
+pub mod sampling;
+pub mod screen;
+pub mod session;
+pub mod settings;
+pub mod view;

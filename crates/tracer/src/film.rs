@@ -9,6 +9,7 @@ use crate::{
     kernels::{FILM_WORDS, layout::FilmCounters},
 };
 
+mod probe;
 mod snapshot;
 
 pub use snapshot::{FilmPixel, FilmSnapshot};
@@ -148,14 +149,26 @@ pub struct ReadError;
 
 /// Copies a whole buffer to the host, waiting for the device.
 pub(crate) fn read_buffer<T: bytemuck::AnyBitPattern>(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<T>, ReadError> {
+    read_ranges(gpu, &[(buffer, 0, buffer.size())])
+}
+
+/// Copies ranges (offset and length in bytes) of buffers to the host, one after the other, waiting for the device.
+pub(crate) fn read_ranges<T: bytemuck::AnyBitPattern>(
+    gpu: &Gpu,
+    ranges: &[(&wgpu::Buffer, u64, u64)],
+) -> Result<Vec<T>, ReadError> {
     let staging = gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("read-back"),
-        size: buffer.size(),
+        size: ranges.iter().map(|(_, _, length)| length).sum(),
         usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     });
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("read-back") });
-    encoder.copy_buffer_to_buffer(buffer, 0, &staging, 0, buffer.size());
+    let mut end = 0;
+    for &(buffer, offset, length) in ranges {
+        encoder.copy_buffer_to_buffer(buffer, offset, &staging, end, length);
+        end += length;
+    }
     gpu.queue.submit([encoder.finish()]);
     let (sender, receiver) = std::sync::mpsc::channel();
     staging.slice(..).map_async(wgpu::MapMode::Read, move |result| {

@@ -81,7 +81,7 @@ impl Gpu {
     /// When there is no adapter, none by that name, or it cannot run the tracer.
     pub fn headless(select: &AdapterSelect) -> Result<Self, GpuError> {
         let adapters = usable_adapters();
-        let adapter = choose(&adapters, select)?.clone();
+        let adapter = Self::choose(&adapters, select)?.clone();
         let info = adapter.get_info();
         let (required_features, required_limits) = Self::requirements(&adapter);
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
@@ -117,7 +117,7 @@ impl Gpu {
     /// Every adapter that wgpu finds.
     pub fn adapters() -> Vec<AdapterDescription> {
         let adapters = usable_adapters();
-        let default = choose(&adapters, &AdapterSelect::Auto).ok().map(wgpu::Adapter::get_info);
+        let default = Self::choose(&adapters, &AdapterSelect::Auto).ok().map(wgpu::Adapter::get_info);
         let mut default_seen = false;
         adapters
             .iter()
@@ -128,6 +128,32 @@ impl Gpu {
                 AdapterDescription { shortfalls: shortfalls(&adapter.limits()), is_default, info }
             })
             .collect()
+    }
+
+    /// Which of these adapters to take.
+    ///
+    /// # Errors
+    /// When there is none, or none by that name.
+    pub fn choose<'a>(adapters: &'a [wgpu::Adapter], select: &AdapterSelect) -> Result<&'a wgpu::Adapter, GpuError> {
+        let wanted = match select {
+            AdapterSelect::Auto => std::env::var("WGPU_ADAPTER_NAME").ok(),
+            AdapterSelect::Named(name) => Some(name.clone()),
+        };
+        if let Some(wanted) = wanted {
+            let lower = wanted.to_lowercase();
+            return adapters.iter().find(|a| a.get_info().name.to_lowercase().contains(&lower)).ok_or_else(|| {
+                let found = adapters.iter().map(|a| a.get_info().name).collect::<Vec<_>>().join(", ");
+                GpuError::NoSuchAdapter { wanted, found: if found.is_empty() { "none".into() } else { found } }
+            });
+        }
+        let rank = |adapter: &wgpu::Adapter| match adapter.get_info().device_type {
+            wgpu::DeviceType::DiscreteGpu => 0,
+            wgpu::DeviceType::IntegratedGpu => 1,
+            wgpu::DeviceType::VirtualGpu => 2,
+            wgpu::DeviceType::Other => 3,
+            wgpu::DeviceType::Cpu => 4,
+        };
+        adapters.iter().min_by_key(|adapter| rank(adapter)).ok_or(GpuError::NoAdapter)
     }
 
     /// Name, driver and kind of the adapter.
@@ -159,28 +185,6 @@ fn usable_adapters() -> Vec<wgpu::Adapter> {
     let descriptor = wgpu::InstanceDescriptor::new_without_display_handle().with_env();
     let backends = descriptor.backends & (wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12);
     pollster::block_on(wgpu::Instance::new(descriptor).enumerate_adapters(backends))
-}
-
-fn choose<'a>(adapters: &'a [wgpu::Adapter], select: &AdapterSelect) -> Result<&'a wgpu::Adapter, GpuError> {
-    let wanted = match select {
-        AdapterSelect::Auto => std::env::var("WGPU_ADAPTER_NAME").ok(),
-        AdapterSelect::Named(name) => Some(name.clone()),
-    };
-    if let Some(wanted) = wanted {
-        let lower = wanted.to_lowercase();
-        return adapters.iter().find(|a| a.get_info().name.to_lowercase().contains(&lower)).ok_or_else(|| {
-            let found = adapters.iter().map(|a| a.get_info().name).collect::<Vec<_>>().join(", ");
-            GpuError::NoSuchAdapter { wanted, found: if found.is_empty() { "none".into() } else { found } }
-        });
-    }
-    let rank = |adapter: &wgpu::Adapter| match adapter.get_info().device_type {
-        wgpu::DeviceType::DiscreteGpu => 0,
-        wgpu::DeviceType::IntegratedGpu => 1,
-        wgpu::DeviceType::VirtualGpu => 2,
-        wgpu::DeviceType::Other => 3,
-        wgpu::DeviceType::Cpu => 4,
-    };
-    adapters.iter().min_by_key(|adapter| rank(adapter)).ok_or(GpuError::NoAdapter)
 }
 
 fn shortfalls(limits: &wgpu::Limits) -> Vec<String> {

@@ -280,6 +280,22 @@ impl Renderer {
         Ok(())
     }
 
+    /// How samples are spread.
+    pub fn distribution(&self) -> &Distribution {
+        &self.distribution
+    }
+
+    /// Mean number of samples in the film's pixels about a direction of the world, at most `radius` columns and rows
+    /// away; 0 where the film does not reach. Waits for the device.
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn samples_near(&self, direction: Vec3, radius: u32) -> Result<f32, RenderError> {
+        let in_film = self.pose.world_from_film.inverse() * direction;
+        let Some(pixel) = self.options.film.pixel_of(in_film) else { return Ok(0.0) };
+        Ok(self.film.samples_near(&self.gpu, pixel, radius)?)
+    }
+
     /// Starts the film anew; what is shown meanwhile is the old picture.
     pub fn restart(&mut self) {
         self.view.keep_as_stale(&self.gpu);

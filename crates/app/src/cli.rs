@@ -1,0 +1,275 @@
+//! The command line: what can be asked for, with ranges checked while it is read.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+
+use crate::sampling::Acuity;
+use crate::screen::ScreenGeometry;
+
+pub mod choices;
+pub mod values;
+
+use choices::{Clip, EccentricityAt, Geometry, InverseForm, Mode, Model, Orient, Sequence, ToneMapping};
+use values::{CameraChoice, FilmShape, GazeAngles, Rgb, SizeMm, SizePx, ViewAngles};
+
+/// Foveated progressive preview of glTF scenes: looks converge first where you look.
+#[derive(Debug, Parser)]
+#[command(name = "fovea", version, args_conflicts_with_subcommands = true, disable_help_subcommand = true)]
+pub struct Cli {
+    /// What to do; the preview window without one.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// The preview window's options.
+    #[command(flatten)]
+    pub preview: PreviewArgs,
+}
+
+/// What `fovea` does beside the preview window.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Render without a window to an EXR or PNG file
+    Render(Box<RenderArgs>),
+    /// Say what a scene holds and what of it is not supported
+    Info(InfoArgs),
+    /// List the graphics adapters and which one would be used
+    Adapters(AdaptersArgs),
+}
+
+/// `fovea [SCENE]`.
+#[derive(Clone, Debug, Args)]
+pub struct PreviewArgs {
+    /// What to show.
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// How samples are placed.
+    #[command(flatten)]
+    pub sampling: SamplingArgs,
+    /// How radiance becomes a picture.
+    #[command(flatten)]
+    pub picture: PictureArgs,
+    /// Clip foveated samples to the view and a margin; in the window 95 % of them (default) or none
+    #[arg(long, value_enum, default_value_t = Clip::View, value_name = "CLIP")]
+    pub clip: Clip,
+    /// Where eccentricity is measured: at the eye before the screen, or in the scene
+    #[arg(long, value_enum, default_value_t = EccentricityAt::Eye, value_name = "PLACE")]
+    pub eccentricity: EccentricityAt,
+    /// The window's size when it opens, pixels
+    #[arg(long, default_value = "1280x720", value_name = "WxH")]
+    pub window: SizePx,
+    /// Memory that the film may take, MiB; more gives a finer panorama
+    #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(16..=65536), value_name = "MIB")]
+    pub film_memory: u32,
+    /// Save what the window shows after this many seconds, then close it (for tests and documentation)
+    #[arg(
+        long, hide = true,
+        value_parser = values::positive_seconds, requires = "screenshot", value_name = "SECONDS"
+    )]
+    pub screenshot_after: Option<f64>,
+    /// Where that picture goes; the figures of the overlay go to standard output as JSON
+    #[arg(long, hide = true, requires = "screenshot_after", value_name = "OUT.png")]
+    pub screenshot: Option<PathBuf>,
+}
+
+/// `fovea render`.
+#[derive(Clone, Debug, Args)]
+pub struct RenderArgs {
+    /// What to render.
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// The image to write: .exr (radiance, variance, samples) or .png (the reconstructed picture)
+    #[arg(short, long, value_name = "OUT.exr|OUT.png")]
+    pub output: PathBuf,
+    /// How samples are placed.
+    #[command(flatten)]
+    pub sampling: SamplingArgs,
+    /// The film: equirect:WxH is the whole panorama, perspective:WxH what the camera's lens sees
+    #[arg(long, default_value = "equirect:2048x1024", value_name = "KIND:WxH")]
+    pub film: FilmShape,
+    /// What the film's centre points at: the world's -Z or the camera's axis [default: world; camera for perspective]
+    #[arg(long, value_enum, value_name = "AXES")]
+    pub orient: Option<Orient>,
+    /// The view of modes vp and vp-region and of --clip view, degrees from the film's centre
+    /// [default: 0,0,100x100; the whole film for perspective]
+    #[arg(long, allow_hyphen_values = true, value_name = "YAW,PITCH,HFOVxVFOV")]
+    pub view: Option<ViewAngles>,
+    /// Where one looks, degrees from the film's centre, + to the right and + up
+    #[arg(long, allow_hyphen_values = true, default_value = "0,0", value_name = "YAW,PITCH")]
+    pub gaze: GazeAngles,
+    /// Clip foveated samples to the view and a margin
+    #[arg(long, value_enum, default_value_t = Clip::None, value_name = "CLIP")]
+    pub clip: Clip,
+    /// Where eccentricity is measured: in the scene, or at the eye before a screen that shows the view
+    #[arg(long, value_enum, default_value_t = EccentricityAt::Scene, value_name = "PLACE")]
+    pub eccentricity: EccentricityAt,
+    /// When to stop.
+    #[command(flatten)]
+    pub stop: StopArgs,
+    /// How radiance becomes a PNG.
+    #[command(flatten)]
+    pub picture: PictureArgs,
+    /// Print one JSON object about the run on standard output
+    #[arg(long)]
+    pub json: bool,
+    /// Write the shaders that ran, one WGSL file a kernel, into this folder
+    #[arg(long, value_name = "DIR")]
+    pub dump_kernels: Option<PathBuf>,
+}
+
+/// `fovea info`.
+#[derive(Clone, Debug, Args)]
+pub struct InfoArgs {
+    /// The glTF scene (.glb or .gltf) [default: the built-in one]
+    pub scene: Option<PathBuf>,
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `fovea adapters`.
+#[derive(Clone, Debug, Args)]
+pub struct AdaptersArgs {
+    /// Print one JSON object on standard output
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What is rendered, and from where.
+#[derive(Clone, Debug, Args)]
+pub struct SceneArgs {
+    /// The glTF scene (.glb or .gltf) [default: the built-in one]
+    pub scene: Option<PathBuf>,
+    /// Camera by its place in the file, from 0, or by name [default: the first, else one that frames the scene]
+    #[arg(long, value_name = "N|NAME")]
+    pub camera: Option<CameraChoice>,
+    /// Radiance from everywhere outside the scene, linear [default: the file's or black; a neutral sky if it is unlit]
+    #[arg(long, value_name = "R,G,B", conflicts_with = "env")]
+    pub background: Option<Rgb>,
+    /// Equirectangular environment image, .hdr or .exr
+    #[arg(long, value_name = "FILE")]
+    pub env: Option<PathBuf>,
+    /// Turns the environment image to the right, degrees
+    #[arg(
+        long, allow_negative_numbers = true, default_value_t = 0.0, requires = "env",
+        value_parser = values::finite, value_name = "DEG"
+    )]
+    pub env_rotate: f32,
+    /// Graphics adapter whose name contains this [default: as `fovea adapters` says]
+    #[arg(long, value_name = "NAME")]
+    pub adapter: Option<String>,
+}
+
+/// How samples are placed and paths are traced.
+#[derive(Clone, Debug, Args)]
+pub struct SamplingArgs {
+    /// Omnidirectional, viewport (image plane or film pixels of the view), or foveated
+    #[arg(long, value_enum, default_value_t = Mode::Fv, value_name = "MODE")]
+    pub mode: Mode,
+    /// Visual acuity model of mode fv
+    #[arg(long, value_enum, default_value_t = Model::Reddy, value_name = "MODEL")]
+    pub model: Model,
+    /// Density per solid angle on the sphere, or the planar approximation
+    #[arg(long, value_enum, default_value_t = Geometry::Sphere, value_name = "GEOMETRY")]
+    pub geometry: Geometry,
+    /// How the radius is drawn [default: the cheapest form within 2e-5 (sphere) or 4e-5 (plane)]
+    #[arg(long, value_enum, value_name = "FORM")]
+    pub inverse: Option<InverseForm>,
+    /// Acuity below which no direction falls, 0..=1; higher converges the periphery sooner, the gaze later
+    /// [default: 0.002; none with --inverse eq6]
+    #[arg(long, allow_negative_numbers = true, value_parser = values::unit_interval, value_name = "M")]
+    pub floor: Option<f64>,
+    /// The whole screen, millimetres (with --eccentricity eye)
+    #[arg(long, default_value = "531x299", value_name = "WxH")]
+    pub screen_mm: SizeMm,
+    /// From the eye to the screen, millimetres (with --eccentricity eye)
+    #[arg(
+        long, allow_negative_numbers = true, default_value_t = 650.0,
+        value_parser = values::distance_mm, value_name = "MM"
+    )]
+    pub distance_mm: f32,
+    /// Indirect bounces; higher shows more of the light that goes through many surfaces, and costs time
+    #[arg(
+        long, allow_negative_numbers = true, default_value_t = 8,
+        value_parser = clap::value_parser!(u32).range(0..=4096), value_name = "N"
+    )]
+    pub max_bounces: u32,
+    /// Seed of all random choices: the same seed gives the same picture
+    #[arg(long, allow_negative_numbers = true, default_value_t = 1, value_name = "N")]
+    pub seed: u32,
+    /// Low-discrepancy points, or independent ones for statistics
+    #[arg(long, value_enum, default_value_t = Sequence::Sobol, value_name = "SEQUENCE")]
+    pub sequence: Sequence,
+}
+
+impl SamplingArgs {
+    /// What the foveated mode goes by.
+    pub fn acuity(&self) -> Acuity {
+        Acuity { model: self.model, geometry: self.geometry, inverse: self.inverse, floor: self.floor }
+    }
+
+    /// The screen before the eye.
+    pub fn screen(&self) -> ScreenGeometry {
+        let SizeMm { width, height } = self.screen_mm;
+        ScreenGeometry { width_mm: width, height_mm: height, distance_mm: self.distance_mm }
+    }
+}
+
+/// How radiance becomes a picture.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct PictureArgs {
+    /// Stops by which the picture is brightened, -20..=20
+    #[arg(
+        long, allow_negative_numbers = true, default_value_t = 0.0,
+        value_parser = values::exposure_ev, value_name = "EV"
+    )]
+    pub exposure: f32,
+    /// From radiance to display values
+    #[arg(long, value_enum, default_value_t = ToneMapping::Agx, value_name = "NAME")]
+    pub tonemap: ToneMapping,
+}
+
+/// When `fovea render` stops; 16 samples a pixel unless one is given.
+#[derive(Clone, Copy, Debug, Args)]
+#[group(multiple = false)]
+pub struct StopArgs {
+    /// Stop after this many samples
+    #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..), value_name = "N")]
+    pub samples: Option<u64>,
+    /// Stop after this many samples times the film's pixels, wherever they fall [default: 16]
+    #[arg(
+        long, allow_negative_numbers = true,
+        value_parser = clap::value_parser!(u64).range(1..=1 << 32), value_name = "N"
+    )]
+    pub spp: Option<u64>,
+    /// Stop after tracing for this long
+    #[arg(long, allow_negative_numbers = true, value_parser = values::positive_seconds, value_name = "SECONDS")]
+    pub seconds: Option<f64>,
+}
+
+/// A command line that is not to be carried out.
+#[derive(Debug)]
+pub enum Stop {
+    /// Help or the version was asked for; the text is for standard output.
+    Asked(String),
+    /// One line that says what is wrong.
+    Wrong(String),
+}
+
+/// Reads a command line, the program's name first.
+pub fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Cli, Stop> {
+    Cli::try_parse_from(arguments).map_err(|error| {
+        let text = error.render().to_string();
+        if error.use_stderr() { Stop::Wrong(one_line(&text)) } else { Stop::Asked(text) }
+    })
+}
+
+/// The first paragraph of clap's message, as one line without its `error: `.
+fn one_line(message: &str) -> String {
+    let paragraph = message.split("\n\n").next().unwrap_or(message);
+    let words: Vec<&str> = paragraph.split_whitespace().collect();
+    words.join(" ").trim_start_matches("error: ").to_owned()
+}
+
+#[cfg(test)]
+mod tests;

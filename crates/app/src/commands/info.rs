@@ -1,0 +1,101 @@
+//! `fovea info`: what a scene holds, and what of it is not supported.
+
+use serde_json::{Value, json};
+use tracer::import::{ImportOptions, ImportReport};
+use tracer::scene::{Environment, Projection, PunctualKind, Scene};
+
+use super::{print_json, print_text};
+use crate::cli::InfoArgs;
+use crate::session::{self, Source};
+use crate::settings::scene_hash;
+
+/// Prints what the scene holds.
+///
+/// # Errors
+/// When the scene cannot be loaded.
+pub fn run(args: &InfoArgs) -> anyhow::Result<()> {
+    let (scene, report) = match Source::from(args.scene.as_deref()) {
+        Source::BuiltIn => anyhow::bail!("there is no built-in scene yet: name a file"),
+        Source::File(path) => tracer::import::load_gltf(&path, &ImportOptions::default())?,
+    };
+    if args.json { print_json(&describe(&scene, &report)) } else { print_text(&text(&scene, &report)) }
+}
+
+fn describe(scene: &Scene, report: &ImportReport) -> Value {
+    let (low, high) = session::bounds(scene).unwrap_or_default();
+    json!({
+        "scene": scene.name,
+        "scene_hash": scene_hash(scene).to_string(),
+        "generator": report.generator,
+        "triangles": session::triangles(scene),
+        "meshes": scene.meshes.len(),
+        "instances": scene.instances.len(),
+        "materials": scene.materials.len(),
+        "textures": scene.textures.iter().map(|t| json!({ "name": t.name, "size": [t.width, t.height] })).collect::<Vec<_>>(),
+        "lights": scene.lights.iter().map(|l| json!({ "name": l.name, "kind": kind(&l.kind) })).collect::<Vec<_>>(),
+        "emissive_materials": emissive(scene),
+        "cameras": scene.cameras.iter().map(|c| json!({ "name": c.name, "position_m": c.position.to_array() })).collect::<Vec<_>>(),
+        "environment": environment(scene),
+        "bounds_m": [low.to_array(), high.to_array()],
+        "extensions_used": report.extensions_used,
+        "extensions_unsupported": report.extensions_unsupported,
+        "variants": report.variants,
+        "scenes": report.scenes,
+        "warnings": report.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "import_seconds": report.stage_seconds.total,
+    })
+}
+
+fn text(scene: &Scene, report: &ImportReport) -> String {
+    let (low, high) = session::bounds(scene).unwrap_or_default();
+    let size = high - low;
+    let list = |names: &[String]| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+    let cameras: Vec<String> = scene
+        .cameras
+        .iter()
+        .map(|camera| match camera.projection {
+            Projection::Perspective { yfov, .. } => format!("{} ({:.0} degrees high)", camera.name, yfov.to_degrees()),
+            Projection::Orthographic { .. } => format!("{} (orthographic)", camera.name),
+        })
+        .collect();
+    let lights: Vec<String> =
+        scene.lights.iter().map(|light| format!("{} ({})", light.name, kind(&light.kind))).collect();
+    let texels: u64 = scene.textures.iter().map(|t| u64::from(t.width) * u64::from(t.height)).sum();
+    let rows = [
+        ("triangles", session::triangles(scene).to_string()),
+        ("meshes", format!("{} in {} places", scene.meshes.len(), scene.instances.len())),
+        ("materials", format!("{}, {} of them emissive", scene.materials.len(), emissive(scene))),
+        ("textures", format!("{}, {:.1} Mpixel", scene.textures.len(), texels as f64 * 1e-6)),
+        ("lights", list(&lights)),
+        ("cameras", list(&cameras)),
+        ("environment", environment(scene)),
+        ("size", format!("{:.3} x {:.3} x {:.3} m", size.x, size.y, size.z)),
+        ("extensions", list(&report.extensions_used)),
+        ("not supported", list(&report.extensions_unsupported)),
+    ];
+    let mut text = format!("{}\n", scene.name);
+    text.extend(rows.iter().map(|(name, value)| format!("  {name:<14} {value}\n")));
+    text.extend(report.warnings.iter().map(|warning| format!("  note: {warning}\n")));
+    text
+}
+
+fn emissive(scene: &Scene) -> usize {
+    scene.materials.iter().filter(|material| material.emission.max_element() > 0.0).count()
+}
+
+fn kind(kind: &PunctualKind) -> &'static str {
+    match kind {
+        PunctualKind::Point => "point",
+        PunctualKind::Spot { .. } => "spot",
+        PunctualKind::Directional { .. } => "directional",
+    }
+}
+
+fn environment(scene: &Scene) -> String {
+    match &scene.environment {
+        Environment::Constant(radiance) => format!("constant {} {} {}", radiance.x, radiance.y, radiance.z),
+        Environment::Image { image, rotation_deg, .. } => {
+            format!("image {}x{}, turned by {rotation_deg} degrees", image.width, image.height)
+        }
+    }
+}

@@ -1,0 +1,292 @@
+//! `fovea render`: the same renderer without a window.
+
+use std::io::IsTerminal;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use anyhow::Context;
+use glam::{Quat, Vec2};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::{Value, json};
+use tracer::distribution::View;
+use tracer::film::{FilmMapping, FilmOptions};
+use tracer::gpu::{AdapterSelect, Gpu};
+use tracer::renderer::{FilmPose, RenderStatistics, Renderer, RendererOptions, SceneReport, StopCondition};
+use tracer::view::{DebugView, ViewProjection, ViewSettings};
+
+use super::print_json;
+use crate::cli::choices::Orient;
+use crate::cli::values::{FilmShape, ViewAngles};
+use crate::cli::{RenderArgs, StopArgs};
+use crate::output::exr::{self, FilmFile};
+use crate::output::{ImageFormat, check_writable, png};
+use crate::readback;
+use crate::sampling::{Aim, GazePoint};
+use crate::session::{self, Source, Viewpoint};
+use crate::settings::{RunSettings, mode_name};
+use crate::view::direction;
+
+/// Samples a film pixel unless told otherwise.
+const DEFAULT_SPP: u64 = 16;
+/// The view unless told otherwise, degrees across and up.
+const DEFAULT_VIEW: ViewAngles = ViewAngles { yaw_deg: 0.0, pitch_deg: 0.0, hfov_deg: 100.0, vfov_deg: 100.0 };
+
+/// Renders a scene to a file.
+///
+/// # Errors
+/// Bad input, an unwritable output, or an adapter that cannot do it; the output file is then as it was.
+pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
+    let format = ImageFormat::of(&args.output)?;
+    check_writable(&args.output)?;
+    let source = Source::from(args.scene.scene.as_deref());
+    let import_start = Instant::now();
+    let (scene, import) = session::load(&source, &args.scene)?;
+    let import_seconds = import_start.elapsed().as_secs_f64();
+    for warning in import.warnings.iter().filter(|_| !args.json) {
+        eprintln!("note: {warning}");
+    }
+    let viewpoints = session::viewpoints(&scene);
+    let camera = &viewpoints[session::choose(&viewpoints, args.scene.camera.as_ref())?];
+
+    let gpu = Gpu::headless(&args.scene.adapter.clone().map_or(AdapterSelect::Auto, AdapterSelect::Named))?;
+    let film = film_options(args.film, camera);
+    if format == ImageFormat::Png {
+        readback::check_size(&gpu, [film.width, film.height])?;
+    }
+    let pose = FilmPose { position: camera.position, world_from_film: world_from_film(args, camera) };
+    let aim = aim(args, &film, pose.world_from_film);
+    let inverse = args.sampling.acuity().inverse()?;
+    let options = RendererOptions {
+        film,
+        max_bounces: args.sampling.max_bounces,
+        seed: args.sampling.seed,
+        sequence: args.sampling.sequence.into(),
+    };
+    let mut renderer = Renderer::new(&gpu, &options, aim.distribution(&film, pose.world_from_film, &inverse))?;
+    let prepared = renderer.set_scene(&scene)?;
+    renderer.set_pose(pose);
+    if let Some(folder) = &args.dump_kernels {
+        dump_kernels(&renderer, folder)?;
+    }
+
+    let seconds = trace(&mut renderer, stop(&args.stop, &film), args.json)?;
+    let settings = RunSettings {
+        scene: &scene,
+        renderer: &options,
+        pose,
+        mode: args.sampling.mode,
+        acuity: args.sampling.acuity(),
+        samples: renderer.samples(),
+    };
+    match format {
+        ImageFormat::Exr => exr::write(&args.output, FilmFile::new(&renderer.snapshot()?, settings.to_json()))?,
+        ImageFormat::Png => {
+            let texels = readback::draw(&mut renderer, &whole_film(args, &film))?;
+            png::write(&args.output, film.width, film.height, &texels)?;
+        }
+    }
+    if args.json {
+        let run = Run { seconds, import_seconds, prepared, statistics: renderer.statistics()? };
+        return print_json(&run.to_json(&gpu, &settings));
+    }
+    Ok(())
+}
+
+fn film_options(shape: FilmShape, camera: &Viewpoint) -> FilmOptions {
+    match shape {
+        FilmShape::Equirect(size) => FilmOptions::equirect(size.width, size.height),
+        FilmShape::Perspective(size) => FilmOptions::perspective(size.width, size.height, camera.vfov),
+    }
+}
+
+fn world_from_film(args: &RenderArgs, camera: &Viewpoint) -> Quat {
+    let orient = args.orient.unwrap_or(match args.film {
+        FilmShape::Equirect(_) => Orient::World,
+        FilmShape::Perspective(_) => Orient::Camera,
+    });
+    match orient {
+        Orient::World => Quat::IDENTITY,
+        Orient::Camera => camera.rotation,
+    }
+}
+
+/// View and gaze, which the command line has relative to the film's centre, in the world.
+fn aim(args: &RenderArgs, film: &FilmOptions, world_from_film: Quat) -> Aim {
+    let view = match (args.view, film.mapping) {
+        (None, FilmMapping::Perspective { half_extent }) => {
+            View { world_from_view: world_from_film, half_extent: Vec2::from(half_extent) }
+        }
+        (angles, _) => {
+            let angles = angles.unwrap_or(DEFAULT_VIEW);
+            let film_from_view = crate::view::View::new(
+                angles.yaw_deg.to_radians(),
+                angles.pitch_deg.to_radians(),
+                angles.hfov_deg.to_radians(),
+                angles.vfov_deg.to_radians(),
+            );
+            View {
+                world_from_view: world_from_film * film_from_view.film_from_view(),
+                half_extent: film_from_view.tan_half,
+            }
+        }
+    };
+    let gaze = world_from_film * direction(args.gaze.yaw_deg.to_radians(), args.gaze.pitch_deg.to_radians());
+    let screen = args.sampling.screen();
+    Aim {
+        mode: args.sampling.mode,
+        view,
+        gaze: GazePoint::towards(gaze, &view),
+        clip: args.clip,
+        eccentricity: args.eccentricity,
+        screen_half_extent: Vec2::new(screen.width_mm, screen.height_mm) * 0.5 / screen.distance_mm,
+    }
+}
+
+fn stop(args: &StopArgs, film: &FilmOptions) -> StopCondition {
+    match (args.samples, args.seconds) {
+        (Some(samples), _) => StopCondition::Samples(samples),
+        (None, Some(seconds)) => StopCondition::Seconds(seconds),
+        (None, None) => StopCondition::Samples(args.spp.unwrap_or(DEFAULT_SPP).saturating_mul(film.pixels())),
+    }
+}
+
+/// Traces with a progress bar on a terminal; returns the seconds of tracing.
+fn trace(renderer: &mut Renderer, stop: StopCondition, quiet: bool) -> anyhow::Result<f64> {
+    const STEPS: u64 = 1000;
+    let bar = if quiet || !std::io::stderr().is_terminal() { ProgressBar::hidden() } else { ProgressBar::new(STEPS) };
+    let style =
+        ProgressStyle::with_template("{bar:40} {percent:>3} %  {elapsed} elapsed, {eta} left").context("style")?;
+    bar.set_style(style);
+    bar.enable_steady_tick(Duration::from_millis(200));
+    let seconds = renderer.render(stop, |fraction| {
+        bar.set_position((fraction * STEPS as f64) as u64);
+        true
+    })?;
+    bar.finish_and_clear();
+    Ok(seconds)
+}
+
+fn whole_film(args: &RenderArgs, film: &FilmOptions) -> ViewSettings {
+    ViewSettings {
+        projection: ViewProjection::Film,
+        size: [film.width, film.height],
+        exposure_ev: args.picture.exposure,
+        tone_map: args.picture.tonemap.into(),
+        debug_view: DebugView::Beauty,
+        fill: true,
+        ring: None,
+    }
+}
+
+fn dump_kernels(renderer: &Renderer, folder: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir_all(folder).with_context(|| format!("{}: cannot be made", folder.display()))?;
+    for (name, text) in renderer.kernel_texts()? {
+        let path = folder.join(format!("{}.wgsl", name.replace('/', "-")));
+        std::fs::write(&path, text).with_context(|| format!("{}: cannot be written", path.display()))?;
+    }
+    Ok(())
+}
+
+/// What `--json` reports beside the settings.
+struct Run {
+    seconds: f64,
+    import_seconds: f64,
+    prepared: SceneReport,
+    statistics: RenderStatistics,
+}
+
+impl Run {
+    fn to_json(&self, gpu: &Gpu, settings: &RunSettings<'_>) -> Value {
+        let info = gpu.info();
+        let statistics = &self.statistics;
+        let per_second = |count: u64| count as f64 / self.seconds.max(1e-9);
+        let samples = statistics.samples;
+        json!({
+            "adapter": info.name,
+            "backend": info.backend.to_string(),
+            "driver": format!("{} {}", info.driver, info.driver_info).trim(),
+            "scene": settings.scene.name,
+            "mode": mode_name(settings.mode),
+            "samples": samples,
+            "seconds": self.seconds,
+            "stage_seconds": {
+                "import": self.import_seconds,
+                "bvh_build": self.prepared.upload.bvh_build_secs,
+                "upload": self.prepared.upload.upload_secs,
+                "kernel_compile": self.prepared.kernel_compile_secs,
+                "trace": self.seconds,
+            },
+            "samples_per_s": per_second(samples),
+            "segments_per_s": per_second(statistics.segments),
+            "shadow_rays_per_s": per_second(statistics.shadow_rays),
+            "mean_path_length": statistics.segments as f64 / samples.max(1) as f64,
+            "non_finite_dropped": statistics.non_finite,
+            "clamped": statistics.clamped,
+            "triangles": session::triangles(settings.scene),
+            "lights": self.prepared.upload.lights,
+            "device_bytes": self.prepared.upload.device_bytes,
+            "film_bytes": settings.renderer.film.bytes(),
+            "settings": settings.to_json(),
+        })
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use std::ffi::OsString;
+
+    use glam::Vec3;
+
+    use super::*;
+    use crate::cli::{self, Command};
+
+    fn args(line: &str) -> RenderArgs {
+        let words = format!("fovea render -o a.exr {line}");
+        match cli::parse(words.split_whitespace().map(OsString::from)).unwrap().command {
+            Some(Command::Render(args)) => *args,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn camera() -> Viewpoint {
+        Viewpoint {
+            name: "c".into(),
+            position: Vec3::ZERO,
+            rotation: Quat::from_rotation_y(-std::f32::consts::FRAC_PI_2),
+            vfov: 1.0,
+        }
+    }
+
+    #[test]
+    fn angles_are_relative_to_the_films_centre() {
+        for (line, gaze) in
+            [("--gaze 90,0", Vec3::X), ("--gaze 0,90", Vec3::Y), ("--gaze 0,0 --orient camera", Vec3::X)]
+        {
+            let args = args(line);
+            let film = film_options(args.film, &camera());
+            let aim = aim(&args, &film, world_from_film(&args, &camera()));
+            assert!(aim.gaze.direction.distance(gaze) < 1e-5, "{line}: {}", aim.gaze.direction);
+        }
+    }
+
+    #[test]
+    fn a_perspective_film_looks_through_the_camera_unless_told_otherwise() {
+        let args = args("--film perspective:200x100");
+        let rotation = world_from_film(&args, &camera());
+        assert_eq!(rotation, camera().rotation);
+        let film = film_options(args.film, &camera());
+        let view = aim(&args, &film, rotation).view;
+        assert_eq!(FilmMapping::Perspective { half_extent: view.half_extent.to_array() }, film.mapping);
+        assert!((view.half_extent.y - 0.5_f32.tan()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn spp_counts_film_pixels_in_every_mode() {
+        let film = FilmOptions::equirect(64, 32);
+        for (line, samples) in [("", 16 * 2048), ("--spp 3", 3 * 2048), ("--samples 7", 7)] {
+            assert_eq!(stop(&args(line).stop, &film), StopCondition::Samples(samples));
+        }
+        assert_eq!(stop(&args("--seconds 2.5").stop, &film), StopCondition::Seconds(2.5));
+    }
+}

@@ -1,0 +1,405 @@
+//! The thread that loads, traces and draws the picture, so that the window never waits for any of it.
+//!
+//! The window says what it wants to see ([`Engine::look`], the last word counts) and asks for things to be done
+//! ([`Engine::request`], in order). The thread answers with a [`State`] and asks the window to repaint.
+
+use std::path::PathBuf;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, TryRecvError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use anyhow::Context;
+use glam::UVec2;
+use tracer::gpu::Gpu;
+
+use super::controls::{Controls, Readout};
+use super::gaze::{Gaze, ScreenMapping};
+use super::navigation::Standpoint;
+use super::pacing::Pacing;
+use super::tracing::{OpenScene, Tracing};
+use crate::cli::PreviewArgs;
+use crate::cli::choices::Mode;
+use crate::output::exr;
+use crate::session::{Source, one_line};
+
+/// How long a thread with nothing to trace sleeps between looks at what the window wants.
+const IDLE: Duration = Duration::from_millis(50);
+/// Over how long a rate is averaged.
+const RATE_WINDOW: Duration = Duration::from_millis(800);
+
+/// What the window shows, as the person has it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Look {
+    /// Where the viewer is.
+    pub standpoint: Standpoint,
+    /// Where the viewer looks.
+    pub gaze: Gaze,
+    /// Settings.
+    pub controls: Controls,
+    /// The picture on the screen.
+    pub mapping: ScreenMapping,
+    /// Physical pixels of the picture.
+    pub size_px: UVec2,
+}
+
+/// Something to be done once.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Request {
+    /// Load this and show it instead; what is shown stays if that fails.
+    Open(Source),
+    /// Empty the film.
+    Restart,
+    /// Save the picture as it is shown.
+    SavePng(PathBuf),
+    /// Save the whole film.
+    SaveExr(PathBuf),
+}
+
+/// The picture on the device.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    /// 8-bit texels, encoded for the display.
+    pub texture: wgpu::TextureView,
+    /// Changes with the texture.
+    pub generation: u64,
+}
+
+/// A note for the person.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Message {
+    /// One line.
+    pub text: String,
+    /// Whether something went wrong.
+    pub wrong: bool,
+    /// When it was written.
+    pub at: Instant,
+}
+
+impl Message {
+    fn now(text: String, wrong: bool) -> Self {
+        Self { text, wrong, at: Instant::now() }
+    }
+}
+
+/// What the thread is up to.
+#[derive(Clone, Debug, Default)]
+pub struct State {
+    /// What takes long at the moment, such as `loading room.glb`.
+    pub busy: Option<String>,
+    /// The last thing to tell.
+    pub message: Option<Message>,
+    /// The scene on screen; a new one is a new `Arc`.
+    pub scene: Option<Arc<OpenScene>>,
+    /// The picture, once there is one.
+    pub picture: Option<Picture>,
+    /// Figures.
+    pub readout: Readout,
+    /// The film's size, such as `4096x2048`.
+    pub film: String,
+    /// The mode of the last batch.
+    pub mode: Option<Mode>,
+    /// The thread has stopped for good: the device is lost, or it panicked.
+    pub dead: bool,
+}
+
+#[derive(Default)]
+struct Shared {
+    look: Mutex<Option<Look>>,
+    state: Mutex<State>,
+}
+
+/// Handle of the thread; dropping it stops the thread.
+pub struct Engine {
+    shared: Arc<Shared>,
+    requests: Option<Sender<Request>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Engine {
+    /// Starts the thread. `repaint` is called whenever there is something new to show.
+    ///
+    /// # Errors
+    /// When the system gives no thread.
+    pub fn start(gpu: Gpu, args: &PreviewArgs, repaint: impl Fn() + Send + 'static) -> std::io::Result<Self> {
+        let shared = Arc::new(Shared::default());
+        let (requests, inbox) = mpsc::channel();
+        let worker = Worker {
+            shared: Arc::clone(&shared),
+            inbox,
+            pacing: Pacing::new(gpu.is_software()),
+            tracing: Tracing::new(gpu, args.clone()),
+            repaint: Box::new(repaint),
+            shown: None,
+            show_time: Duration::ZERO,
+            shown_at: None,
+            rate: Rate::default(),
+        };
+        let thread = std::thread::Builder::new().name("engine".into()).spawn(move || worker.run())?;
+        Ok(Self { shared, requests: Some(requests), thread: Some(thread) })
+    }
+
+    /// Says what the window shows.
+    pub fn look(&self, look: Look) {
+        *lock(&self.shared.look) = Some(look);
+    }
+
+    /// Asks for something to be done; a thread that has stopped does nothing.
+    pub fn request(&self, request: Request) {
+        if let Some(requests) = &self.requests {
+            // A closed channel means that the thread has stopped, which `state` reports.
+            let _ = requests.send(request);
+        }
+    }
+
+    /// What the thread is up to.
+    pub fn state(&self) -> State {
+        let mut state = lock(&self.shared.state).clone();
+        state.dead |= self.thread.as_ref().is_none_or(JoinHandle::is_finished);
+        state
+    }
+}
+
+impl Drop for Engine {
+    fn drop(&mut self) {
+        self.requests = None;
+        if let Some(thread) = self.thread.take() {
+            // A panic of the thread has been reported by the panic hook.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Locks, whether or not another holder panicked: the values are plain data, valid at any time.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+struct Worker {
+    shared: Arc<Shared>,
+    inbox: Receiver<Request>,
+    tracing: Tracing,
+    pacing: Pacing,
+    repaint: Box<dyn Fn() + Send>,
+    /// What the picture on screen shows, and the samples in it.
+    shown: Option<(Look, u64)>,
+    /// How long drawing the picture takes.
+    show_time: Duration,
+    shown_at: Option<Instant>,
+    rate: Rate,
+}
+
+impl Worker {
+    /// Until the window closes or the device is lost.
+    fn run(mut self) {
+        loop {
+            match self.next_request() {
+                Ok(Some(request)) => self.carry_out(request),
+                Ok(None) => {}
+                Err(Closed) => return,
+            }
+            let look = lock(&self.shared.look).clone();
+            let Some(look) = look.filter(|_| self.tracing.is_open()) else { continue };
+            if let Err(error) = self.frame(&look) {
+                self.tell(one_line(&error), true);
+                let mut state = lock(&self.shared.state);
+                state.dead = true;
+                drop(state);
+                (self.repaint)();
+                return;
+            }
+        }
+    }
+
+    /// One batch, and a picture when it is time for one.
+    fn frame(&mut self, look: &Look) -> anyhow::Result<()> {
+        if self.tracing.follow(look)? {
+            self.pacing.restart();
+        }
+        if !look.controls.paused {
+            let batch = self.pacing.batch();
+            let took = self.tracing.trace(batch)?;
+            self.pacing.measured(batch, took, self.show_time);
+            self.rate.add(self.tracing.samples(), Instant::now());
+        }
+        if self.is_due(look) {
+            self.show(look)?;
+        }
+        Ok(())
+    }
+
+    /// A picture is due when what it shows has changed, or when its share of the time has come.
+    fn is_due(&self, look: &Look) -> bool {
+        let Some((shown, samples)) = &self.shown else { return true };
+        if shown.standpoint != look.standpoint || shown.size_px != look.size_px || shown.controls != look.controls {
+            return true;
+        }
+        let waited = self.shown_at.map_or(Duration::MAX, |at| at.elapsed());
+        *samples != self.tracing.samples() && waited >= self.pacing.show_interval(self.show_time)
+    }
+
+    fn show(&mut self, look: &Look) -> anyhow::Result<()> {
+        let start = Instant::now();
+        let picture = self.tracing.show(look)?;
+        self.show_time = start.elapsed();
+        self.shown_at = Some(Instant::now());
+        let samples = self.tracing.samples();
+        self.shown = Some((look.clone(), samples));
+        let readout = Readout {
+            samples,
+            samples_per_s: self.rate.per_second(),
+            spp_at_gaze: self.tracing.samples_at(look.standpoint.view.direction_at(look.gaze.point))?,
+            elapsed: self.tracing.elapsed(),
+            non_finite_dropped: self.tracing.non_finite_dropped()?,
+        };
+        let film = self.tracing.film_size().map(|[width, height]| format!("{width}x{height}")).unwrap_or_default();
+        let mut state = lock(&self.shared.state);
+        state.picture = Some(picture);
+        state.readout = readout;
+        state.film = film;
+        state.mode = Some(look.controls.mode);
+        drop(state);
+        (self.repaint)();
+        Ok(())
+    }
+
+    /// The next request, waiting a little for one when there is nothing to trace.
+    fn next_request(&self) -> Result<Option<Request>, Closed> {
+        let up_to_date = |look: &Look| look.controls.paused && !self.is_due(look);
+        let idle = !self.tracing.is_open() || lock(&self.shared.look).as_ref().is_none_or(up_to_date);
+        if idle {
+            match self.inbox.recv_timeout(IDLE) {
+                Ok(request) => Ok(Some(request)),
+                Err(RecvTimeoutError::Timeout) => Ok(None),
+                Err(RecvTimeoutError::Disconnected) => Err(Closed),
+            }
+        } else {
+            match self.inbox.try_recv() {
+                Ok(request) => Ok(Some(request)),
+                Err(TryRecvError::Empty) => Ok(None),
+                Err(TryRecvError::Disconnected) => Err(Closed),
+            }
+        }
+    }
+
+    fn carry_out(&mut self, request: Request) {
+        let result = match request {
+            Request::Open(source) => self.open(&source),
+            Request::Restart => {
+                self.tracing.restart();
+                self.pacing.restart();
+                self.rate = Rate::default();
+                Ok(None)
+            }
+            Request::SavePng(path) => {
+                self.busy(Some(format!("saving {}", path.display())));
+                self.tracing.save_png(&path).map(|()| Some(format!("saved {}", path.display())))
+            }
+            Request::SaveExr(path) => {
+                self.busy(Some(format!("saving {}", path.display())));
+                self.save_exr(path)
+            }
+        };
+        self.busy(None);
+        match result {
+            Ok(Some(text)) => self.tell(text, false),
+            Ok(None) => {}
+            Err(error) => self.tell(one_line(&error), true),
+        }
+    }
+
+    /// Reads the film back here and writes the file elsewhere: compressing a large film takes seconds.
+    fn save_exr(&mut self, path: PathBuf) -> anyhow::Result<Option<String>> {
+        let (look, _) = self.shown.as_ref().context("there is no picture yet")?;
+        let film = self.tracing.film(look)?;
+        let shared = Arc::clone(&self.shared);
+        std::thread::Builder::new().name("save".into()).spawn(move || {
+            let message = match exr::write(&path, film) {
+                Ok(()) => Message::now(format!("saved {}", path.display()), false),
+                Err(error) => Message::now(error.to_string(), true),
+            };
+            lock(&shared.state).message = Some(message);
+        })?;
+        Ok(None)
+    }
+
+    fn open(&mut self, source: &Source) -> anyhow::Result<Option<String>> {
+        self.busy(Some(format!("loading {}", source.name())));
+        let scene = self.tracing.open(source)?;
+        self.shown = None;
+        self.pacing.restart();
+        self.rate = Rate::default();
+        // What the window showed of the last scene says nothing about this one.
+        *lock(&self.shared.look) = None;
+        let mut state = lock(&self.shared.state);
+        state.scene = Some(Arc::new(scene));
+        state.message = None;
+        drop(state);
+        (self.repaint)();
+        Ok(None)
+    }
+
+    fn busy(&self, text: Option<String>) {
+        lock(&self.shared.state).busy = text;
+        (self.repaint)();
+    }
+
+    fn tell(&self, text: String, wrong: bool) {
+        lock(&self.shared.state).message = Some(Message::now(text, wrong));
+        (self.repaint)();
+    }
+}
+
+/// The window is gone.
+struct Closed;
+
+/// Samples a second over a sliding window.
+#[derive(Debug, Default)]
+struct Rate {
+    history: std::collections::VecDeque<(u64, Instant)>,
+}
+
+impl Rate {
+    fn add(&mut self, samples: u64, now: Instant) {
+        if self.history.back().is_some_and(|(last, _)| samples < *last) {
+            self.history.clear();
+        }
+        self.history.push_back((samples, now));
+        while self.history.len() > 2 && now.duration_since(self.history[1].1) > RATE_WINDOW {
+            self.history.pop_front();
+        }
+    }
+
+    fn per_second(&self) -> f64 {
+        match (self.history.front(), self.history.back()) {
+            (Some((first, start)), Some((last, end))) if end > start => {
+                (last - first) as f64 / end.duration_since(*start).as_secs_f64()
+            }
+            _ => 0.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rate_follows_the_last_second_and_a_restart() {
+        let start = Instant::now();
+        let at = |ms| start + Duration::from_millis(ms);
+        let mut rate = Rate::default();
+        assert_eq!(rate.per_second(), 0.0);
+        for step in 0..=20 {
+            rate.add(step * 1000, at(step * 100));
+        }
+        assert!((rate.per_second() - 10_000.0).abs() < 1e-6);
+        for step in 1..=20 {
+            rate.add(20_000 + step * 3000, at(2000 + step * 100));
+        }
+        assert!((rate.per_second() - 30_000.0).abs() < 1e-6);
+        rate.add(10, at(5000));
+        rate.add(20, at(6000));
+        assert!((rate.per_second() - 10.0).abs() < 1e-6);
+    }
+}

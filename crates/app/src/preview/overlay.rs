@@ -1,0 +1,289 @@
+//! What lies over the picture: settings, figures, notes and the list of keys.
+
+use egui::{Align, Align2, Area, ComboBox, Context, DragValue, Grid, Id, Layout, Order, RichText, Slider, Ui};
+
+use super::controls::{Controls, MODES, Readout, Shown, TONE_MAPS, clock, metric};
+use super::theme;
+use crate::cli::choices::{Clip, EccentricityAt, Mode, Model};
+
+/// Width of the panel, points.
+const PANEL_WIDTH: f32 = 236.0;
+
+/// What the keys do, as `?` lists them.
+pub const KEYS: [(&str, &str); 15] = [
+    ("Drag", "look around"),
+    ("Wheel", "zoom at the pointer"),
+    ("W A S D  Q E", "fly; Shift: faster"),
+    ("1 - 9", "the file's cameras"),
+    ("Home", "back to the camera"),
+    ("M", "next mode"),
+    ("Space", "pause"),
+    ("R", "restart"),
+    ("F", "ring at the fovea"),
+    ("X", "sample density"),
+    ("[  ]", "exposure"),
+    ("Ctrl S", "save the picture as PNG"),
+    ("Ctrl Shift S", "save the film as EXR"),
+    ("H", "hide or show the panel"),
+    ("?", "this list"),
+];
+
+/// What is open and what is hidden.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Visibility {
+    /// The panel.
+    pub panel: bool,
+    /// The list of keys.
+    pub keys: bool,
+    /// The ring at the fovea.
+    pub ring: bool,
+}
+
+impl Default for Visibility {
+    fn default() -> Self {
+        Self { panel: true, keys: false, ring: true }
+    }
+}
+
+/// Something that a button or key asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Action {
+    /// Start the film again.
+    Restart,
+    /// Save what the window shows.
+    SavePng,
+    /// Save the whole film.
+    SaveExr,
+    /// Go to a camera of the file.
+    Camera(usize),
+}
+
+/// What the panel shows and cannot change.
+#[derive(Clone, Debug, Default)]
+pub struct Facts<'a> {
+    /// The scene's name.
+    pub scene: &'a str,
+    /// `212 k triangles, 4 lights`.
+    pub contents: &'a str,
+    /// The adapter's name.
+    pub adapter: &'a str,
+    /// `4096x2048`.
+    pub film: &'a str,
+    /// Names of the file's cameras.
+    pub cameras: &'a [String],
+    /// The camera last jumped to.
+    pub camera: usize,
+    /// What the import met and did not support.
+    pub notes: &'a [String],
+    /// Figures.
+    pub readout: Readout,
+    /// Degrees at the eye of a pixel at the centre.
+    pub deg_per_px: f32,
+}
+
+/// Draws the panel.
+pub fn panel(ctx: &Context, facts: &Facts<'_>, controls: &mut Controls, visibility: &mut Visibility) -> Vec<Action> {
+    let mut actions = Vec::new();
+    Area::new(Id::unique("panel")).anchor(Align2::LEFT_TOP, egui::vec2(10.0, 10.0)).show(ctx, |ui| {
+        theme::panel().show(ui, |ui| {
+            ui.set_width(PANEL_WIDTH);
+            header(ui, facts);
+            modes(ui, controls);
+            figures(ui, facts, controls.paused);
+            ui.separator();
+            picture(ui, controls);
+            cameras(ui, facts, &mut actions);
+            buttons(ui, controls, &mut actions);
+            ui.separator();
+            ui.collapsing("Sampling and screen", |ui| sampling(ui, facts, controls, visibility));
+            notes(ui, facts.notes);
+            ui.label(RichText::new("?  keys      H  hide").small().weak());
+        });
+    });
+    actions
+}
+
+fn header(ui: &mut Ui, facts: &Facts<'_>) {
+    ui.horizontal(|ui| {
+        ui.add(egui::Label::new(RichText::new(facts.scene).heading()).truncate());
+    });
+    ui.add(egui::Label::new(RichText::new(facts.contents).small().weak()).truncate());
+}
+
+fn modes(ui: &mut Ui, controls: &mut Controls) {
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 3.0;
+        for (mode, name, explanation) in MODES {
+            ui.selectable_value(&mut controls.mode, mode, name).on_hover_text(explanation);
+        }
+    });
+}
+
+fn figures(ui: &mut Ui, facts: &Facts<'_>, paused: bool) {
+    let readout = &facts.readout;
+    let rows = [
+        ("Samples/s", if paused { "paused".to_owned() } else { metric(readout.samples_per_s) }, "Light paths a second"),
+        ("At the gaze", format!("{} spp", metric(readout.spp_at_gaze.into())), "Samples per film pixel at the gaze"),
+        ("In all", metric(readout.samples as f64), "Samples in the film"),
+        ("Elapsed", clock(readout.elapsed), "Since the film started"),
+    ];
+    Grid::new("figures").num_columns(2).min_col_width(80.0).spacing([8.0, 3.0]).show(ui, |ui| {
+        for (name, value, explanation) in rows {
+            ui.label(RichText::new(name).weak()).on_hover_text(explanation);
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| ui.label(RichText::new(value).monospace()));
+            ui.end_row();
+        }
+    });
+    if readout.non_finite_dropped > 0 {
+        let text = format!("{} samples were not finite", readout.non_finite_dropped);
+        ui.label(RichText::new(text).small().color(theme::NOTICE));
+    }
+}
+
+fn picture(ui: &mut Ui, controls: &mut Controls) {
+    Grid::new("picture").num_columns(2).min_col_width(72.0).spacing([8.0, 5.0]).show(ui, |ui| {
+        let label = ui.label(RichText::new("Exposure").weak());
+        let slider = Slider::new(&mut controls.exposure_ev, -8.0..=8.0).step_by(0.1).fixed_decimals(1).suffix(" EV");
+        ui.spacing_mut().slider_width = 84.0;
+        ui.add(slider).labelled_by(label.id);
+        ui.end_row();
+
+        let label = ui.label(RichText::new("Tone map").weak());
+        let name = TONE_MAPS.iter().find(|entry| entry.0 == controls.tone_map).map_or("", |entry| entry.1);
+        let combo = ComboBox::from_id_salt("tone map").width(126.0).selected_text(name).show_ui(ui, |ui| {
+            for (tone_map, name) in TONE_MAPS {
+                ui.selectable_value(&mut controls.tone_map, tone_map, name);
+            }
+        });
+        combo.response.labelled_by(label.id);
+        ui.end_row();
+
+        ui.label(RichText::new("Show").weak());
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 3.0;
+            ui.selectable_value(&mut controls.shown, Shown::Picture, "Picture");
+            ui.selectable_value(&mut controls.shown, Shown::Density, "Density")
+                .on_hover_text("Samples per film pixel, each colour step a factor of ten");
+        });
+        ui.end_row();
+    });
+}
+
+fn cameras(ui: &mut Ui, facts: &Facts<'_>, actions: &mut Vec<Action>) {
+    let Some(current) = facts.cameras.get(facts.camera) else { return };
+    ui.horizontal(|ui| {
+        let label = ui.label(RichText::new("Camera").weak());
+        let combo = ComboBox::from_id_salt("camera").width(166.0).truncate().selected_text(current).show_ui(ui, |ui| {
+            for (index, name) in facts.cameras.iter().enumerate() {
+                if ui.selectable_label(index == facts.camera, format!("{}  {name}", index + 1)).clicked() {
+                    actions.push(Action::Camera(index));
+                }
+            }
+        });
+        combo.response.labelled_by(label.id);
+    });
+}
+
+fn buttons(ui: &mut Ui, controls: &mut Controls, actions: &mut Vec<Action>) {
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        if ui.button(if controls.paused { "Resume" } else { "Pause" }).on_hover_text("Space").clicked() {
+            controls.paused = !controls.paused;
+        }
+        for (name, hint, action) in [
+            ("Restart", "R", Action::Restart),
+            ("Save PNG", "Ctrl S: the picture as shown", Action::SavePng),
+            ("Save EXR", "Ctrl Shift S: the whole film, linear", Action::SaveExr),
+        ] {
+            if ui.button(name).on_hover_text(hint).clicked() {
+                actions.push(action);
+            }
+        }
+    });
+}
+
+fn sampling(ui: &mut Ui, facts: &Facts<'_>, controls: &mut Controls, visibility: &mut Visibility) {
+    ui.add_enabled_ui(controls.mode == Mode::Fv, |ui| {
+        let label = ui.label(RichText::new("Acuity model").weak());
+        let model = &mut controls.acuity.model;
+        let model_name = Model::LIST.iter().find(|entry| entry.0 == *model).map_or("", |entry| entry.1);
+        let combo = ComboBox::from_id_salt("model").selected_text(model_name).show_ui(ui, |ui| {
+            for (choice, name) in Model::LIST {
+                ui.selectable_value(model, choice, name);
+            }
+        });
+        combo.response.labelled_by(label.id);
+        let mut clipped = controls.clip == Clip::View;
+        ui.checkbox(&mut clipped, "95 % of the samples in the view");
+        controls.clip = if clipped { Clip::View } else { Clip::None };
+        let mut at_eye = controls.eccentricity == EccentricityAt::Eye;
+        ui.checkbox(&mut at_eye, "Eccentricity at the eye").on_hover_text("Off: angles in the scene, as in a headset");
+        controls.eccentricity = if at_eye { EccentricityAt::Eye } else { EccentricityAt::Scene };
+    });
+    ui.checkbox(&mut visibility.ring, "Ring at the fovea");
+    Grid::new("screen").num_columns(2).spacing([8.0, 3.0]).show(ui, |ui| {
+        let screen = &mut controls.screen;
+        for (name, value, range) in [
+            ("Screen width", &mut screen.width_mm, 100.0..=5000.0),
+            ("Screen height", &mut screen.height_mm, 100.0..=5000.0),
+            ("Distance", &mut screen.distance_mm, 100.0..=10_000.0),
+        ] {
+            let label = ui.label(RichText::new(name).weak());
+            ui.add(DragValue::new(value).range(range).suffix(" mm").speed(1.0).max_decimals(0)).labelled_by(label.id);
+            ui.end_row();
+        }
+        ui.label(RichText::new("One pixel").weak());
+        ui.label(format!("{:.4} deg", facts.deg_per_px));
+        ui.end_row();
+    });
+    ui.label(RichText::new(format!("Film {}", facts.film)).small().weak());
+    ui.add(egui::Label::new(RichText::new(facts.adapter).small().weak()).truncate());
+}
+
+fn notes(ui: &mut Ui, notes: &[String]) {
+    if notes.is_empty() {
+        return;
+    }
+    let title = RichText::new(format!("Import notes ({})", notes.len())).color(theme::NOTICE);
+    egui::CollapsingHeader::new(title).id_salt("notes").show(ui, |ui| {
+        egui::ScrollArea::vertical().max_height(160.0).show(ui, |ui| {
+            for note in notes {
+                ui.label(RichText::new(note).small());
+            }
+        });
+    });
+}
+
+/// Draws the list of keys, in the middle of the window.
+pub fn keys(ctx: &Context) {
+    Area::new(Id::unique("keys")).anchor(Align2::CENTER_CENTER, egui::Vec2::ZERO).order(Order::Foreground).show(
+        ctx,
+        |ui| {
+            theme::panel().show(ui, |ui| {
+                Grid::new("keys").num_columns(2).spacing([18.0, 4.0]).show(ui, |ui| {
+                    for (key, does) in KEYS {
+                        ui.label(RichText::new(key).monospace().color(theme::ACCENT));
+                        ui.label(does);
+                        ui.end_row();
+                    }
+                });
+            });
+        },
+    );
+}
+
+/// Draws a message at the bottom: what is going on, or what went wrong.
+pub fn message(ctx: &Context, text: &str, wrong: bool, busy: bool) {
+    let area = Area::new(Id::unique("message")).anchor(Align2::CENTER_BOTTOM, egui::vec2(0.0, -14.0));
+    area.order(Order::Foreground).interactable(false).show(ctx, |ui| {
+        theme::panel().show(ui, |ui| {
+            ui.horizontal(|ui| {
+                if busy {
+                    ui.add(egui::Spinner::new().size(13.0).color(theme::ACCENT));
+                }
+                let text = RichText::new(text);
+                ui.label(if wrong { text.color(theme::ERROR) } else { text });
+            });
+        });
+    });
+}

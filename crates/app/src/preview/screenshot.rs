@@ -1,0 +1,85 @@
+//! `--screenshot-after SECONDS --screenshot FILE`: how tests and the documentation look at the window.
+
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use egui::{ColorImage, Context, ViewportCommand};
+use serde_json::{Value, json};
+
+use super::engine::State;
+use crate::output::png;
+use crate::settings::mode_name;
+
+/// Where the outcome of a screenshot is left for whoever opened the window.
+pub type Outcome = Arc<Mutex<Option<anyhow::Result<Value>>>>;
+
+/// Waits for its time, saves what the window shows, and closes it.
+pub struct Screenshot {
+    after: Duration,
+    path: PathBuf,
+    outcome: Outcome,
+    /// Since the first picture.
+    since: Option<Instant>,
+    asked: bool,
+    sender: Sender<Arc<ColorImage>>,
+    receiver: Receiver<Arc<ColorImage>>,
+}
+
+impl Screenshot {
+    /// Counts from the window's first picture.
+    pub fn new(after_secs: f64, path: PathBuf, outcome: Outcome) -> Self {
+        let (sender, receiver) = channel();
+        let after = Duration::try_from_secs_f64(after_secs).unwrap_or_default();
+        Self { after, path, outcome, since: None, asked: false, sender, receiver }
+    }
+
+    /// To be called every frame.
+    pub fn update(&mut self, ctx: &Context, state: &State) {
+        ctx.request_repaint_after(Duration::from_millis(50));
+        if let Ok(image) = self.receiver.try_recv() {
+            let texels: Vec<[u8; 4]> = image.pixels.iter().map(|pixel| pixel.to_array()).collect();
+            let size = image.size.map(|side| side as u32);
+            let written = png::write(&self.path, size[0], size[1], &texels);
+            self.leave(ctx, written.map(|()| figures(state)).map_err(Into::into));
+            return;
+        }
+        let failed = state.scene.is_none() && state.busy.is_none();
+        if let Some(message) = state.message.as_ref().filter(|message| message.wrong && (failed || state.dead)) {
+            self.leave(ctx, Err(anyhow::anyhow!("{}", message.text)));
+            return;
+        }
+        if state.picture.is_none() {
+            return;
+        }
+        let since = *self.since.get_or_insert_with(Instant::now);
+        if !self.asked && since.elapsed() >= self.after {
+            self.asked = true;
+            let (sender, ctx_of_reply) = (self.sender.clone(), ctx.clone());
+            let callback = egui::ScreenshotCallback::new(move |image| {
+                // The window may be closed by then; the picture is of no use to anybody else.
+                let _ = sender.send(image);
+                ctx_of_reply.request_repaint();
+            });
+            ctx.send_viewport_cmd(ViewportCommand::Screenshot(callback));
+        }
+    }
+
+    fn leave(&self, ctx: &Context, outcome: anyhow::Result<Value>) {
+        *self.outcome.lock().unwrap_or_else(PoisonError::into_inner) = Some(outcome);
+        ctx.send_viewport_cmd(ViewportCommand::Close);
+    }
+}
+
+fn figures(state: &State) -> Value {
+    let readout = &state.readout;
+    json!({
+        "samples": readout.samples,
+        "samples_per_s": readout.samples_per_s,
+        "spp_at_gaze": readout.spp_at_gaze,
+        "elapsed_s": readout.elapsed.as_secs_f64(),
+        "film": state.film,
+        "mode": state.mode.map(mode_name),
+    })
+}

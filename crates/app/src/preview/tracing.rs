@@ -1,0 +1,320 @@
+//! What the engine's thread does with the renderer.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use anyhow::Context;
+use fovea_sampler::Inverse;
+use glam::{UVec2, Vec3};
+use tracer::distribution::View as TracerView;
+use tracer::gpu::Gpu;
+use tracer::renderer::{FilmPose, Renderer, RendererOptions};
+use tracer::scene::Scene;
+use tracer::view::{DebugView, ViewProjection, ViewSettings};
+
+use super::controls::{Shown, metric};
+use super::engine::{Look, Picture};
+use crate::cli::PreviewArgs;
+use crate::cli::choices::Mode;
+use crate::film::FilmPlan;
+use crate::output::exr::FilmFile;
+use crate::output::png;
+use crate::readback;
+use crate::sampling::{Acuity, Aim, GazePoint};
+use crate::session::{self, Source, Viewpoint};
+use crate::settings::RunSettings;
+use crate::view::View;
+
+/// The read-out at the gaze is a mean over so many pixels to each side.
+const READOUT_RADIUS_PX: u32 = 3;
+
+/// A scene on screen.
+#[derive(Clone, Debug)]
+pub struct OpenScene {
+    /// What a person calls it.
+    pub name: String,
+    /// Triangles, lights, textures.
+    pub contents: String,
+    /// The file's cameras, or the one that frames the scene.
+    pub viewpoints: Vec<Viewpoint>,
+    /// Place in `viewpoints` to start from.
+    pub start: usize,
+    /// What the import met and did not support, one line each.
+    pub notes: Vec<String>,
+    /// Across all that is visible, metres.
+    pub diagonal: f32,
+}
+
+struct Open {
+    scene: Arc<Scene>,
+    renderer: Option<Renderer>,
+    plan: Option<FilmPlan>,
+}
+
+struct Target {
+    texture: wgpu::Texture,
+    picture: Picture,
+}
+
+/// Renderer, scene and picture.
+pub struct Tracing {
+    gpu: Gpu,
+    args: PreviewArgs,
+    open: Option<Open>,
+    target: Option<Target>,
+    generations: u64,
+    inverse: Option<(Acuity, Arc<Inverse>)>,
+    aim: Option<Aim>,
+    view: Option<View>,
+    traced: Duration,
+}
+
+impl Tracing {
+    /// Nothing is open at first.
+    pub fn new(gpu: Gpu, args: PreviewArgs) -> Self {
+        Self {
+            gpu,
+            args,
+            open: None,
+            target: None,
+            generations: 0,
+            inverse: None,
+            aim: None,
+            view: None,
+            traced: Duration::ZERO,
+        }
+    }
+
+    /// Whether there is a scene to trace.
+    pub fn is_open(&self) -> bool {
+        self.open.is_some()
+    }
+
+    /// Loads a scene; the last one stays if that fails.
+    pub fn open(&mut self, source: &Source) -> anyhow::Result<OpenScene> {
+        let (scene, report) = session::load(source, &self.args.scene)?;
+        let viewpoints = session::viewpoints(&scene);
+        let start = session::choose(&viewpoints, self.args.scene.camera.as_ref()).unwrap_or(0);
+        let lights = scene.lights.len();
+        let contents = format!(
+            "{} triangles, {} textures{}",
+            metric(session::triangles(&scene) as f64),
+            scene.textures.len(),
+            if lights == 0 { String::new() } else { format!(", {lights} lights") },
+        );
+        let mut notes: Vec<String> = report.warnings.iter().map(ToString::to_string).collect();
+        if let (Some(camera), true) = (&self.args.scene.camera, notes.is_empty() || start == 0)
+            && session::choose(&viewpoints, Some(camera)).is_err()
+        {
+            notes.insert(0, "the camera asked for is not in this scene".into());
+        }
+        let (low, high) = session::bounds(&scene).unwrap_or((Vec3::ZERO, Vec3::ONE));
+        let name = scene.name.clone();
+        self.set_scene(scene)?;
+        Ok(OpenScene { name, contents, viewpoints, start, notes, diagonal: (high - low).length() })
+    }
+
+    fn set_scene(&mut self, scene: Arc<Scene>) -> anyhow::Result<()> {
+        match &mut self.open {
+            Some(Open { renderer: Some(renderer), scene: shown, .. }) => {
+                renderer.set_scene(&scene)?;
+                *shown = scene;
+            }
+            _ => self.open = Some(Open { scene, renderer: None, plan: None }),
+        }
+        self.traced = Duration::ZERO;
+        Ok(())
+    }
+
+    /// Film pixels across and down.
+    pub fn film_size(&self) -> Option<[u32; 2]> {
+        let plan = self.open.as_ref()?.plan?;
+        Some([plan.options.width, plan.options.height])
+    }
+
+    /// Brings film, pose and distribution in line with what the window shows. True when the picture changes at once.
+    pub fn follow(&mut self, look: &Look) -> anyhow::Result<bool> {
+        let Look { standpoint, controls, size_px, mapping, .. } = look;
+        let view = standpoint.view;
+        let inverse = self.inverse(controls.acuity)?;
+        let world_view = TracerView { world_from_view: view.film_from_view(), half_extent: view.tan_half };
+        let aim = Aim {
+            mode: controls.mode,
+            view: world_view,
+            gaze: GazePoint::at(look.gaze.point, &world_view),
+            clip: controls.clip,
+            eccentricity: controls.eccentricity,
+            screen_half_extent: mapping.half_size_mm / mapping.screen.distance_mm,
+        };
+        let memory = u64::from(self.args.film_memory) << 20;
+        let options = RendererOptions {
+            max_bounces: self.args.sampling.max_bounces,
+            seed: self.args.sampling.seed,
+            sequence: self.args.sampling.sequence.into(),
+            ..RendererOptions::default()
+        };
+        let open = self.open.as_mut().context("no scene is open")?;
+        let size = size_px.as_vec2();
+        if open.plan.is_none_or(|plan| !plan.suits(&view, size)) {
+            let plan = FilmPlan::new(&view, size, memory);
+            if open.plan != Some(plan) {
+                let distribution = aim.distribution(&plan.options, plan.world_from_film, &inverse);
+                // Both films at once might not fit.
+                open.renderer = None;
+                let options = RendererOptions { film: plan.options, ..options };
+                let mut renderer = Renderer::new(&self.gpu, &options, distribution)?;
+                renderer.set_scene(&open.scene)?;
+                open.renderer = Some(renderer);
+                open.plan = Some(plan);
+                self.aim = Some(aim);
+                self.traced = Duration::ZERO;
+            }
+        }
+        let (Some(renderer), Some(plan)) = (&mut open.renderer, open.plan) else { return Ok(false) };
+        let pose = FilmPose { position: standpoint.position, world_from_film: plan.world_from_film };
+        let moved = renderer.pose() != pose;
+        if moved {
+            renderer.set_pose(pose);
+            self.traced = Duration::ZERO;
+        }
+        if self.aim.is_none_or(|last| last.differs(&aim)) || !Arc::ptr_eq(renderer.distribution().inverse(), &inverse) {
+            renderer.set_distribution(aim.distribution(&plan.options, plan.world_from_film, &inverse))?;
+            self.aim = Some(aim);
+        }
+        let turned = self.view != Some(view);
+        self.view = Some(view);
+        Ok(moved || turned)
+    }
+
+    fn inverse(&mut self, acuity: Acuity) -> anyhow::Result<Arc<Inverse>> {
+        match &self.inverse {
+            Some((known, inverse)) if *known == acuity => Ok(Arc::clone(inverse)),
+            _ => {
+                let inverse = acuity.inverse()?;
+                self.inverse = Some((acuity, Arc::clone(&inverse)));
+                Ok(inverse)
+            }
+        }
+    }
+
+    /// Traces a batch, waits for it, and says how long it took.
+    pub fn trace(&mut self, samples: u32) -> anyhow::Result<Duration> {
+        let start = Instant::now();
+        self.renderer()?.trace(samples)?;
+        self.gpu.wait().context("the graphics device was lost")?;
+        let took = start.elapsed();
+        self.traced += took;
+        Ok(took)
+    }
+
+    /// Draws the picture and waits for it.
+    pub fn show(&mut self, look: &Look) -> anyhow::Result<Picture> {
+        let limit = self.gpu.device.limits().max_texture_dimension_2d;
+        let size = look.size_px.clamp(UVec2::ONE, UVec2::splat(limit)).to_array();
+        if self.target.as_ref().is_none_or(|target| [target.texture.width(), target.texture.height()] != size) {
+            self.generations += 1;
+            let texture = readback::picture_texture(&self.gpu, size);
+            let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+            self.target = Some(Target { texture, picture: Picture { texture: view, generation: self.generations } });
+        }
+        let picture = self.target.as_ref().context("made above")?.picture.clone();
+        let mut encoder =
+            self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("show") });
+        self.renderer()?.present(
+            &mut encoder,
+            &view_settings(look, size),
+            &picture.texture,
+            readback::PICTURE_FORMAT,
+        )?;
+        self.gpu.queue.submit([encoder.finish()]);
+        self.gpu.wait().context("the graphics device was lost")?;
+        Ok(picture)
+    }
+
+    /// Empties the film.
+    pub fn restart(&mut self) {
+        if let Some(Open { renderer: Some(renderer), .. }) = &mut self.open {
+            renderer.restart();
+            self.traced = Duration::ZERO;
+        }
+    }
+
+    /// Samples in the film.
+    pub fn samples(&self) -> u64 {
+        self.open.as_ref().and_then(|open| open.renderer.as_ref()).map_or(0, Renderer::samples)
+    }
+
+    /// Time spent tracing since the film started.
+    pub fn elapsed(&self) -> Duration {
+        self.traced
+    }
+
+    /// Samples that were not finite since the film started.
+    pub fn non_finite_dropped(&mut self) -> anyhow::Result<u64> {
+        Ok(self.renderer()?.statistics()?.non_finite.into())
+    }
+
+    /// Mean samples of the film pixels about a direction.
+    pub fn samples_at(&mut self, direction: Vec3) -> anyhow::Result<f32> {
+        Ok(self.renderer()?.samples_near(direction, READOUT_RADIUS_PX)?)
+    }
+
+    /// Writes the picture as it is shown.
+    pub fn save_png(&mut self, path: &Path) -> anyhow::Result<()> {
+        let target = self.target.as_ref().context("there is no picture yet")?;
+        let texels = readback::read_texture(&self.gpu, &target.texture)?;
+        png::write(path, target.texture.width(), target.texture.height(), &texels)?;
+        Ok(())
+    }
+
+    /// The film as a value.
+    pub fn film(&mut self, look: &Look) -> anyhow::Result<FilmFile> {
+        let open = self.open.as_ref().context("there is no film yet")?;
+        let renderer = open.renderer.as_ref().context("there is no film yet")?;
+        let settings = RunSettings {
+            scene: &open.scene,
+            renderer: renderer.options(),
+            pose: renderer.pose(),
+            mode: look.controls.mode,
+            acuity: look.controls.acuity,
+            samples: renderer.samples(),
+        };
+        Ok(FilmFile::new(&renderer.snapshot()?, settings.to_json()))
+    }
+
+    fn renderer(&mut self) -> anyhow::Result<&mut Renderer> {
+        self.open.as_mut().and_then(|open| open.renderer.as_mut()).context("no scene is open")
+    }
+}
+
+impl Aim {
+    /// Whether samples fall elsewhere by `other`.
+    fn differs(&self, other: &Self) -> bool {
+        self.mode != other.mode
+            || match self.mode {
+                Mode::Od => false,
+                Mode::Vp | Mode::VpRegion => self.view != other.view,
+                Mode::Fv => self != other,
+            }
+    }
+}
+
+fn view_settings(look: &Look, size: [u32; 2]) -> ViewSettings {
+    let view = look.standpoint.view;
+    ViewSettings {
+        projection: ViewProjection::Perspective(TracerView {
+            world_from_view: view.film_from_view(),
+            half_extent: view.tan_half,
+        }),
+        size,
+        exposure_ev: look.controls.exposure_ev,
+        tone_map: look.controls.tone_map.into(),
+        debug_view: match look.controls.shown {
+            Shown::Picture => DebugView::Beauty,
+            Shown::Density => DebugView::SampleDensity,
+        },
+        fill: true,
+        ring: None,
+    }
+}

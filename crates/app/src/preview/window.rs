@@ -1,0 +1,253 @@
+//! The window: the picture, what lies over it, and what mouse and keys do.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+use egui::{Color32, Context, Key, Modifiers, Rect, Sense, Ui};
+use glam::UVec2;
+
+use super::controls::{Controls, MODES, Shown};
+use super::engine::{Engine, Look, Message, Request, State};
+use super::gaze::{Gaze, ScreenMapping, fovea_ring};
+use super::navigation::Navigation;
+use super::overlay::{self, Action, Facts, Visibility};
+use super::screenshot::Screenshot;
+use super::tracing::OpenScene;
+use crate::cli::choices::Mode;
+use crate::output::free_name;
+use crate::session::Source;
+
+/// How long a note stays.
+const NOTE: Duration = Duration::from_secs(5);
+/// How long a complaint stays.
+const COMPLAINT: Duration = Duration::from_secs(12);
+
+/// The application.
+pub struct Window {
+    engine: Engine,
+    adapter: String,
+    controls: Controls,
+    visibility: Visibility,
+    gaze: Gaze,
+    /// The scene that `navigation` moves in.
+    scene: Option<(Arc<OpenScene>, Navigation)>,
+    camera: usize,
+    texture: Option<(egui::TextureId, u64)>,
+    screenshot: Option<Screenshot>,
+}
+
+impl Window {
+    /// A window over a running engine.
+    pub fn new(engine: Engine, adapter: String, controls: Controls, screenshot: Option<Screenshot>) -> Self {
+        Self {
+            engine,
+            adapter,
+            controls,
+            visibility: Visibility::default(),
+            gaze: Gaze::default(),
+            scene: None,
+            camera: 0,
+            texture: None,
+            screenshot,
+        }
+    }
+
+    /// Starts from a new scene's camera.
+    fn follow_scene(&mut self, state: &State, rect: Rect) {
+        let Some(open) = &state.scene else { return };
+        if self.scene.as_ref().is_some_and(|(known, _)| Arc::ptr_eq(known, open)) {
+            return;
+        }
+        let aspect = rect.width() / rect.height().max(1.0);
+        if let Some(start) = open.viewpoints.get(open.start) {
+            let navigation = Navigation::new(start.position, start.rotation, start.vfov, aspect, open.diagonal);
+            self.scene = Some((Arc::clone(open), navigation));
+            self.camera = open.start;
+        }
+    }
+
+    /// Puts the engine's texture on the screen.
+    fn show_picture(&mut self, ui: &Ui, frame: &eframe::Frame, state: &State, rect: Rect) {
+        let (Some(picture), Some(render_state)) = (&state.picture, frame.wgpu_render_state()) else { return };
+        let mut renderer = render_state.renderer.write();
+        let filter = wgpu::FilterMode::Linear;
+        let id = match self.texture {
+            Some((id, generation)) if generation == picture.generation => id,
+            Some((id, _)) => {
+                renderer.update_egui_texture_from_wgpu_texture(&render_state.device, &picture.texture, filter, id);
+                id
+            }
+            None => renderer.register_native_texture(&render_state.device, &picture.texture, filter),
+        };
+        self.texture = Some((id, picture.generation));
+        let whole = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
+        ui.painter().image(id, rect, whole, Color32::WHITE);
+    }
+
+    fn look(&self, ctx: &Context, rect: Rect) -> Option<(Look, f32)> {
+        let (_, navigation) = self.scene.as_ref()?;
+        let monitor = ctx.input(|input| input.viewport().monitor_size);
+        let mapping = ScreenMapping::new(self.controls.screen, rect, monitor);
+        let pixels = rect.size() * ctx.pixels_per_point();
+        let look = Look {
+            standpoint: navigation.standpoint,
+            gaze: self.gaze,
+            controls: self.controls.clone(),
+            mapping,
+            size_px: UVec2::new(pixels.x.round().max(1.0) as u32, pixels.y.round().max(1.0) as u32),
+        };
+        Some((look, mapping.deg_per_px(rect, ctx.pixels_per_point())))
+    }
+
+    fn overlay(&mut self, ctx: &Context, state: &State, deg_per_px: f32) {
+        if let Some((scene, _)) = self.scene.as_ref().filter(|_| self.visibility.panel) {
+            let cameras: Vec<String> = scene.viewpoints.iter().map(|viewpoint| viewpoint.name.clone()).collect();
+            let facts = Facts {
+                scene: &scene.name,
+                contents: &scene.contents,
+                adapter: &self.adapter,
+                film: &state.film,
+                cameras: &cameras,
+                camera: self.camera,
+                notes: &scene.notes,
+                readout: state.readout,
+                deg_per_px,
+            };
+            for action in overlay::panel(ctx, &facts, &mut self.controls, &mut self.visibility) {
+                self.act(action);
+            }
+        }
+        if self.visibility.keys {
+            overlay::keys(ctx);
+        }
+        self.message(ctx, state);
+    }
+
+    fn message(&self, ctx: &Context, state: &State) {
+        if let Some(busy) = &state.busy {
+            overlay::message(ctx, busy, false, true);
+            return;
+        }
+        let Some(Message { text, wrong, at }) = &state.message else { return };
+        let stays = if *wrong { COMPLAINT } else { NOTE };
+        // Without a scene there is nothing else to see, so the reason stays.
+        if let Some(left) = stays.checked_sub(at.elapsed()) {
+            ctx.request_repaint_after(left);
+        } else if state.scene.is_some() && !state.dead {
+            return;
+        }
+        overlay::message(ctx, text, *wrong, false);
+    }
+
+    fn act(&mut self, action: Action) {
+        match action {
+            Action::Restart => self.engine.request(Request::Restart),
+            Action::SavePng => self.engine.request(Request::SavePng(self.free_name("png"))),
+            Action::SaveExr => self.engine.request(Request::SaveExr(self.free_name("exr"))),
+            Action::Camera(index) => self.jump(index),
+        }
+    }
+
+    /// A name in the working directory that is not taken.
+    fn free_name(&self, extension: &str) -> PathBuf {
+        let scene = self.scene.as_ref().map_or("picture", |(scene, _)| scene.name.as_str());
+        free_name(std::path::Path::new(""), scene, extension)
+    }
+
+    fn jump(&mut self, index: usize) {
+        let Some((scene, navigation)) = &mut self.scene else { return };
+        if let Some(viewpoint) = scene.viewpoints.get(index) {
+            navigation.jump(viewpoint.position, viewpoint.rotation, viewpoint.vfov);
+            self.camera = index;
+        }
+    }
+
+    fn keys(&mut self, ctx: &Context) {
+        if ctx.egui_wants_keyboard_input() {
+            return;
+        }
+        const NUMBERS: [Key; 9] =
+            [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7, Key::Num8, Key::Num9];
+        let pressed = |modifiers, key| ctx.input_mut(|input| input.consume_key(modifiers, key));
+        let exr = pressed(Modifiers::COMMAND | Modifiers::SHIFT, Key::S);
+        let png = pressed(Modifiers::COMMAND, Key::S);
+        let plain = |key| pressed(Modifiers::NONE, key);
+        let camera = NUMBERS.iter().position(|key| plain(*key)).or_else(|| plain(Key::Home).then_some(self.camera));
+        let restart = plain(Key::R);
+        if plain(Key::Space) {
+            self.controls.paused = !self.controls.paused;
+        }
+        if plain(Key::M) {
+            self.controls.mode = next_mode(self.controls.mode);
+        }
+        if plain(Key::F) {
+            self.visibility.ring = !self.visibility.ring;
+        }
+        if plain(Key::X) {
+            let density = self.controls.shown == Shown::Density;
+            self.controls.shown = if density { Shown::Picture } else { Shown::Density };
+        }
+        let stops = f32::from(u8::from(plain(Key::CloseBracket))) - f32::from(u8::from(plain(Key::OpenBracket)));
+        self.controls.exposure_ev = (self.controls.exposure_ev + 0.5 * stops).clamp(-8.0, 8.0);
+        if plain(Key::H) {
+            self.visibility.panel = !self.visibility.panel;
+        }
+        if pressed(Modifiers::SHIFT, Key::Slash) || pressed(Modifiers::NONE, Key::Questionmark) {
+            self.visibility.keys = !self.visibility.keys;
+        }
+        if pressed(Modifiers::NONE, Key::Escape) {
+            self.visibility.keys = false;
+        }
+        let actions = [(exr, Action::SaveExr), (png, Action::SavePng), (restart, Action::Restart)];
+        actions.into_iter().filter(|(asked, _)| *asked).for_each(|(_, action)| self.act(action));
+        if let Some(index) = camera {
+            self.jump(index);
+        }
+    }
+
+    fn open_dropped_file(&self, ctx: &Context) {
+        let dropped = ctx.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_owned()));
+        if let Some(path) = dropped {
+            self.engine.request(Request::Open(Source::File(path)));
+        }
+    }
+}
+
+impl eframe::App for Window {
+    fn ui(&mut self, ui: &mut Ui, frame: &mut eframe::Frame) {
+        let ctx = ui.ctx().clone();
+        let state = self.engine.state();
+        let rect = ui.max_rect();
+        let response = ui.allocate_rect(rect, Sense::click_and_drag());
+        self.follow_scene(&state, rect);
+        self.keys(&ctx);
+        if let Some((_, navigation)) = &mut self.scene {
+            navigation.update(ui, &response);
+        }
+        self.gaze.update(&response);
+        self.show_picture(ui, frame, &state, rect);
+        let mut deg_per_px = 0.0;
+        if let Some((look, pixel)) = self.look(&ctx, rect) {
+            deg_per_px = pixel;
+            if self.visibility.ring && self.controls.mode == Mode::Fv {
+                ui.painter().extend(fovea_ring(&look.mapping, rect, self.gaze));
+            }
+            self.engine.look(look);
+        }
+        self.overlay(&ctx, &state, deg_per_px);
+        self.open_dropped_file(&ctx);
+        if let Some(screenshot) = &mut self.screenshot {
+            screenshot.update(&ctx, &state);
+        }
+    }
+
+    fn clear_color(&self, _visuals: &egui::Visuals) -> [f32; 4] {
+        [0.04, 0.04, 0.045, 1.0]
+    }
+}
+
+fn next_mode(mode: Mode) -> Mode {
+    let place = MODES.iter().position(|entry| entry.0 == mode).unwrap_or(0);
+    MODES[(place + 1) % MODES.len()].0
+}

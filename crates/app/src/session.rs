@@ -1,0 +1,243 @@
+//! What the window and the headless commands have in common: opening a scene and finding a place to look from.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use anyhow::{Context, bail};
+use glam::{Quat, Vec3};
+use tracer::import::{ImportOptions, ImportReport};
+use tracer::scene::{Environment, Projection, Scene};
+
+use crate::cli::SceneArgs;
+use crate::cli::values::CameraChoice;
+
+/// Vertical angle of view where a camera has none, radians.
+const DEFAULT_VFOV: f32 = 50.0 * std::f32::consts::PI / 180.0;
+/// From where a camera that frames the scene looks at its centre: from the right, above and in front.
+const FRAMING_DIRECTION: Vec3 = Vec3::new(0.5, 0.35, 1.0);
+
+/// Where a scene comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// The scene inside the program.
+    BuiltIn,
+    /// A glTF file.
+    File(PathBuf),
+}
+
+impl Source {
+    /// What a person calls it.
+    pub fn name(&self) -> String {
+        match self {
+            Self::BuiltIn => "the built-in scene".into(),
+            Self::File(path) => path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned(),
+        }
+    }
+}
+
+impl From<Option<&Path>> for Source {
+    fn from(path: Option<&Path>) -> Self {
+        path.map_or(Self::BuiltIn, |path| Self::File(path.to_owned()))
+    }
+}
+
+/// A camera of the scene, or the one that frames it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Viewpoint {
+    /// The camera's name; `framing` for the one made up.
+    pub name: String,
+    /// Metres, in the scene's space.
+    pub position: Vec3,
+    /// World from camera; it looks along -Z.
+    pub rotation: Quat,
+    /// Vertical angle of view, radians.
+    pub vfov: f32,
+}
+
+/// Loads a scene and puts the environment that was asked for around it.
+pub fn load(source: &Source, args: &SceneArgs) -> anyhow::Result<(Arc<Scene>, ImportReport)> {
+    let (mut scene, report) = match source {
+        Source::BuiltIn => anyhow::bail!("there is no built-in scene yet: name a file"),
+        Source::File(path) => tracer::import::load_gltf(path, &ImportOptions::default())?,
+    };
+    if let Some(background) = args.background {
+        scene.environment = Environment::Constant(Vec3::from_array(background.0));
+    }
+    if let Some(path) = &args.env {
+        anyhow::bail!("{}: environment images are not read yet", path.display());
+    }
+    Ok((Arc::new(scene), report))
+}
+
+/// The scene's cameras, or the one that frames it.
+pub fn viewpoints(scene: &Scene) -> Vec<Viewpoint> {
+    let cameras: Vec<_> = scene
+        .cameras
+        .iter()
+        .enumerate()
+        .map(|(index, camera)| Viewpoint {
+            name: if camera.name.is_empty() { format!("camera {index}") } else { camera.name.clone() },
+            position: camera.position,
+            rotation: camera.rotation,
+            vfov: match camera.projection {
+                Projection::Perspective { yfov, .. } => yfov,
+                Projection::Orthographic { .. } => DEFAULT_VFOV,
+            },
+        })
+        .collect();
+    if cameras.is_empty() { vec![framing(scene)] } else { cameras }
+}
+
+/// The place of a camera in [`viewpoints`]; the first unless one is asked for.
+pub fn choose(viewpoints: &[Viewpoint], choice: Option<&CameraChoice>) -> anyhow::Result<usize> {
+    let known = || viewpoints.iter().map(|camera| camera.name.as_str()).collect::<Vec<_>>().join(", ");
+    match choice {
+        None => Ok(0),
+        Some(&CameraChoice::Index(index)) if index < viewpoints.len() => Ok(index),
+        Some(CameraChoice::Index(index)) => {
+            bail!("--camera {index}: the scene has {}, counted from 0: {}", viewpoints.len(), known())
+        }
+        Some(CameraChoice::Name(name)) => viewpoints
+            .iter()
+            .position(|camera| camera.name == *name)
+            .with_context(|| format!("--camera {name}: no such camera; there are: {}", known())),
+    }
+}
+
+/// Corners of the box around all that is visible, metres; `None` without geometry.
+pub fn bounds(scene: &Scene) -> Option<(Vec3, Vec3)> {
+    let boxes: Vec<_> = scene
+        .meshes
+        .iter()
+        .map(|mesh| {
+            mesh.positions.iter().fold((Vec3::MAX, Vec3::MIN), |(low, high), &point| (low.min(point), high.max(point)))
+        })
+        .collect();
+    let visible = scene.instances.iter().filter(|instance| instance.visible);
+    let corners = visible.filter_map(|instance| {
+        let &(low, high) = boxes.get(instance.mesh as usize)?;
+        let corner =
+            |index: u32| Vec3::select(glam::BVec3::new(index & 1 > 0, index & 2 > 0, index & 4 > 0), high, low);
+        (low.x <= high.x)
+            .then(|| [0, 1, 2, 3, 4, 5, 6, 7].map(|index| instance.world_from_mesh.transform_point3(corner(index))))
+    });
+    let (low, high) =
+        corners.flatten().fold((Vec3::MAX, Vec3::MIN), |(low, high), point| (low.min(point), high.max(point)));
+    (low.x <= high.x).then_some((low, high))
+}
+
+/// A camera that sees the whole scene.
+fn framing(scene: &Scene) -> Viewpoint {
+    let (low, high) = bounds(scene).unwrap_or((Vec3::NEG_ONE, Vec3::ONE));
+    let radius = (high - low).length().max(1e-6) * 0.5;
+    let backwards = FRAMING_DIRECTION.normalize();
+    let position = (low + high) * 0.5 + backwards * (radius / (DEFAULT_VFOV * 0.5).sin());
+    let rotation = glam::Mat3::from_cols(
+        Vec3::Y.cross(backwards).normalize(),
+        backwards.cross(Vec3::Y.cross(backwards).normalize()),
+        backwards,
+    );
+    Viewpoint { name: "framing".into(), position, rotation: Quat::from_mat3(&rotation), vfov: DEFAULT_VFOV }
+}
+
+/// Number of visible triangles, instances counted as often as they are placed.
+pub fn triangles(scene: &Scene) -> u64 {
+    let visible = scene.instances.iter().filter(|instance| instance.visible);
+    visible
+        .filter_map(|instance| scene.meshes.get(instance.mesh as usize))
+        .map(|mesh| mesh.triangles.len() as u64)
+        .sum()
+}
+
+/// An error with its causes as one line.
+pub fn one_line(error: &anyhow::Error) -> String {
+    let text = format!("{error:#}");
+    text.split(['\n', '\r']).map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join("; ")
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use glam::{Affine3A, DVec3, Vec2};
+    use tracer::scene::{ContentHash, Instance, Material, Mesh};
+
+    use super::*;
+    use crate::view::View;
+
+    /// A triangle in the unit cube's corner, moved by 10 m and made twice as large, and a hidden one far away.
+    fn scene() -> Scene {
+        let mesh = Mesh {
+            name: String::new(),
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::ONE],
+            normals: vec![Vec3::Z; 3],
+            tangents: vec![],
+            uvs: [vec![], vec![]],
+            colors: vec![],
+            triangles: vec![[0, 1, 2]],
+            hash: ContentHash::default(),
+        };
+        let instance = |offset: f32, visible| Instance {
+            name: String::new(),
+            mesh: 0,
+            material: 0,
+            world_from_mesh: Affine3A::from_scale_rotation_translation(
+                Vec3::splat(2.0),
+                Quat::IDENTITY,
+                Vec3::splat(offset),
+            ),
+            visible,
+            node: 0,
+        };
+        Scene {
+            name: "test".into(),
+            meshes: vec![Arc::new(mesh)],
+            textures: vec![],
+            materials: vec![Arc::new(Material::default())],
+            instances: vec![instance(10.0, true), instance(1000.0, false)],
+            lights: vec![],
+            cameras: vec![],
+            environment: Environment::Constant(Vec3::ONE),
+            origin_in_file: DVec3::ZERO,
+        }
+    }
+
+    #[test]
+    fn bounds_are_those_of_what_is_visible() {
+        let (low, high) = bounds(&scene()).unwrap();
+        assert!(low.distance(Vec3::splat(10.0)) < 1e-5 && high.distance(Vec3::splat(12.0)) < 1e-5);
+        assert_eq!(triangles(&scene()), 1);
+        assert_eq!(bounds(&Scene { instances: vec![], ..scene() }), None);
+    }
+
+    #[test]
+    fn without_a_camera_the_scene_is_framed() {
+        let scene = scene();
+        let found = viewpoints(&scene);
+        assert_eq!(found.len(), 1);
+        let view = View::along(found[0].rotation, found[0].vfov, 1.0);
+        let (low, high) = bounds(&scene).unwrap();
+        for corner in [low, high, Vec3::new(low.x, high.y, low.z), (low + high) * 0.5] {
+            let point = view.point_of((corner - found[0].position).normalize()).unwrap();
+            assert!(point.abs().cmple(Vec2::ONE).all(), "{corner} at {point}");
+        }
+    }
+
+    #[test]
+    fn cameras_are_found_by_place_and_name() {
+        let named = |name: &str| Viewpoint { name: name.into(), ..framing(&scene()) };
+        let cameras = [named("front"), named("back")];
+        assert_eq!(choose(&cameras, None).unwrap(), 0);
+        assert_eq!(choose(&cameras, Some(&CameraChoice::Index(1))).unwrap(), 1);
+        assert_eq!(choose(&cameras, Some(&CameraChoice::Name("back".into()))).unwrap(), 1);
+        for wrong in [CameraChoice::Index(2), CameraChoice::Name("top".into())] {
+            let message = one_line(&choose(&cameras, Some(&wrong)).unwrap_err());
+            assert!(message.contains("front, back"), "{message}");
+        }
+    }
+
+    #[test]
+    fn errors_are_one_line_with_their_causes() {
+        let error = anyhow::anyhow!("first\n  second").context("outer");
+        assert_eq!(one_line(&error), "outer: first; second");
+    }
+}

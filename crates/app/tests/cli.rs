@@ -1,0 +1,210 @@
+//! The program as a person or script calls it: output, exit status, and what happens to files.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use fovea_app::output::exr;
+use serde_json::Value;
+
+/// A folder of its own for a test, with a glTF scene of one square; removed when dropped.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(test: &str) -> Self {
+        let folder = std::env::temp_dir().join(format!("fovea-cli-{test}-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&folder);
+        std::fs::create_dir_all(&folder).unwrap();
+        let corners: [[f32; 3]; 4] = [[-1.0, -1.0, -2.0], [1.0, -1.0, -2.0], [1.0, 1.0, -2.0], [-1.0, 1.0, -2.0]];
+        let mut bytes: Vec<u8> = corners.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
+        bytes.extend([0_u16, 1, 2, 0, 2, 3].iter().flat_map(|index| index.to_le_bytes()));
+        std::fs::write(folder.join("a square.bin"), bytes).unwrap();
+        std::fs::write(folder.join("square.gltf"), SQUARE).unwrap();
+        Self(folder)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.join(name)
+    }
+
+    fn names(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(&self.0).unwrap();
+        let mut names: Vec<_> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // What a failed test leaves in the folder for temporary files harms nothing.
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// A square of 2 m, 2 m before a camera that stands at the origin.
+const SQUARE: &str = r#"{
+    "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0, 1] }],
+    "nodes": [{ "mesh": 0 }, { "camera": 0, "name": "eye" }],
+    "cameras": [{ "type": "perspective", "perspective": { "yfov": 0.8, "znear": 0.1 } }],
+    "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "indices": 1 }] }],
+    "buffers": [{ "uri": "a%20square.bin", "byteLength": 60 }],
+    "bufferViews": [{ "buffer": 0, "byteLength": 48 }, { "buffer": 0, "byteOffset": 48, "byteLength": 12 }],
+    "accessors": [
+        { "bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [-1, -1, -2], "max": [1, 1, -2] },
+        { "bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR" }
+    ]
+}"#;
+
+fn fovea(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_fovea")).args(arguments).output().unwrap()
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// One line on standard error that has all of `parts`, nothing on standard output, exit status 2.
+fn refuses(arguments: &[&str], parts: &[&str]) {
+    let output = fovea(arguments);
+    let message = String::from_utf8(output.stderr).unwrap();
+    let lines: Vec<&str> = message.lines().filter(|line| line.starts_with("error: ")).collect();
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+    assert_eq!(lines.len(), 1, "{arguments:?}: {message}");
+    assert!(message.trim_end().ends_with(lines[0]), "nothing follows the error: {message}");
+    for part in parts {
+        assert!(lines[0].contains(part), "{arguments:?}: {message}");
+    }
+    assert!(output.stdout.is_empty(), "{arguments:?}");
+}
+
+fn json(arguments: &[&str]) -> Value {
+    let output = fovea(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[test]
+fn bad_input_is_refused_in_one_line_and_no_file_is_touched() {
+    let folder = Folder::new("refused");
+    let (scene, out) = (folder.path("square.gltf"), folder.path("out.exr"));
+    std::fs::write(&out, "precious").unwrap();
+    let (scene, out) = (text(&scene), text(&out));
+    let broken = folder.path("broken.glb");
+    std::fs::write(&broken, "glTF, it says").unwrap();
+    let demanding = folder.path("demanding.gltf");
+    let extension = r#""extensionsUsed": ["EXT_unheard_of"], "extensionsRequired": ["EXT_unheard_of"], "scene": 0"#;
+    std::fs::write(&demanding, SQUARE.replace(r#""scene": 0"#, extension)).unwrap();
+    let before = folder.names();
+
+    let missing = folder.path("missing.glb");
+    refuses(&["render", text(&missing), "-o", out], &["missing.glb", "No such file"]);
+    refuses(&["render", text(&broken), "-o", out], &["broken.glb", "glTF"]);
+    refuses(&["render", text(&demanding), "-o", out], &["demanding.gltf", "EXT_unheard_of"]);
+    refuses(&["render", scene, "-o", out, "--camera", "7"], &["--camera 7", "eye"]);
+    refuses(&["render", scene, "-o", out, "--camera", "nose"], &["--camera nose", "eye"]);
+    refuses(&["render", scene, "-o", out, "--adapter", "abacus"], &["abacus"]);
+    refuses(&["render", scene, "-o", out, "--view", "0,0,200x10"], &["--view", "0.1..=170"]);
+    refuses(&["render", scene, "-o", out, "--film", "equirect:65536x65536"], &["65536x65536", "bytes"]);
+    refuses(&["render", scene, "-o", out, "--inverse", "eq6"], &["--inverse"]);
+    refuses(&["render", scene, "-o", text(&folder.path("out.jpg"))], &["out.jpg", ".exr or .png"]);
+    refuses(&["render", scene, "-o", text(&folder.path("no/such/folder/out.png"))], &["out.png", "cannot be written"]);
+    refuses(&["render", scene], &["--output"]);
+    refuses(&["info", text(&missing)], &["missing.glb"]);
+    refuses(&["--frobnicate"], &["--frobnicate"]);
+    refuses(&[text(&missing)], &["missing.glb"]);
+
+    assert_eq!(std::fs::read_to_string(out).unwrap(), "precious");
+    assert_eq!(folder.names(), before);
+}
+
+#[test]
+fn an_exr_holds_every_sample_and_the_same_command_gives_the_same_bytes() {
+    let folder = Folder::new("exr");
+    let (scene, first, second) = (folder.path("square.gltf"), folder.path("1.exr"), folder.path("2.exr"));
+    let arguments = |out| {
+        let film = ["--film", "equirect:64x32", "--samples", "20000", "--seed", "5", "--json"];
+        [&["render", text(&scene), "-o", out], film.as_slice()].concat()
+    };
+    let report = json(&arguments(text(&first)));
+    let film = exr::read(&first).unwrap();
+    assert_eq!((film.width, film.height), (64, 32));
+    assert_eq!(film.samples.iter().map(|&count| u64::from(count)).sum::<u64>(), 20_000);
+    assert_eq!(film.settings["seed"], 5);
+    assert_eq!(film.settings["samples"], 20_000);
+    assert_eq!(film.settings["scene"], "square.gltf");
+    assert!(film.rgb.iter().flatten().all(|value| value.is_finite() && *value >= 0.0));
+    // The gaze is the centre: the pixel there has many times the samples of the one behind.
+    let count = |x: usize, y: usize| film.samples[y * 64 + x];
+    assert!(count(32, 16) > 20 * count(0, 16).max(1), "{} {}", count(32, 16), count(0, 16));
+
+    for key in ["adapter", "driver", "scene", "mode", "samples", "seconds", "samples_per_s", "segments_per_s"] {
+        assert!(!report[key].is_null(), "{key}: {report}");
+    }
+    for key in ["import", "bvh_build", "upload", "kernel_compile", "trace"] {
+        assert!(report["stage_seconds"][key].as_f64().unwrap() >= 0.0, "{key}: {report}");
+    }
+    assert_eq!((report["samples"].as_u64(), report["non_finite_dropped"].as_u64()), (Some(20_000), Some(0)));
+    assert!(report["mean_path_length"].as_f64().unwrap() >= 1.0);
+
+    json(&arguments(text(&second)));
+    assert_eq!(std::fs::read(&first).unwrap(), std::fs::read(&second).unwrap());
+}
+
+#[test]
+fn a_png_shows_the_square_in_every_mode() {
+    let folder = Folder::new("png");
+    let (scene, out) = (folder.path("square.gltf"), folder.path("out.png"));
+    for mode in ["od", "vp", "vp-region", "fv"] {
+        let arguments = ["render", text(&scene), "-o", text(&out), "--film", "perspective:48x48", "--mode", mode];
+        let output = fovea(&[arguments.as_slice(), &["--spp", "8", "--background", "0,0,4"]].concat());
+        assert!(output.status.success(), "{mode}: {}", String::from_utf8_lossy(&output.stderr));
+        assert!(output.stdout.is_empty());
+        let picture = image::open(&out).unwrap().to_rgb8();
+        assert_eq!(picture.dimensions(), (48, 48));
+        // The square fills the picture's middle; the camera sees 0.8 rad of it, so the corners too.
+        let [r, g, b] = picture.get_pixel(24, 24).0;
+        assert!(b > r && b > g && b > 30, "{mode}: {r} {g} {b}");
+    }
+}
+
+#[test]
+fn kernels_are_dumped_one_file_each() {
+    let folder = Folder::new("dump");
+    let (scene, out, kernels) = (folder.path("square.gltf"), folder.path("out.exr"), folder.path("kernels"));
+    let arguments = ["render", text(&scene), "-o", text(&out), "--film", "equirect:16x8", "--samples", "64"];
+    json(&[arguments.as_slice(), &["--json", "--dump-kernels", text(&kernels)]].concat());
+    let files: Vec<_> = std::fs::read_dir(kernels).unwrap().map(|entry| entry.unwrap().path()).collect();
+    assert!(files.len() >= 2 && files.iter().all(|file| file.extension().unwrap() == "wgsl"), "{files:?}");
+    assert!(files.iter().any(|file| std::fs::read_to_string(file).unwrap().contains("@compute")));
+}
+
+#[test]
+fn info_and_adapters_speak_json() {
+    let folder = Folder::new("info");
+    let info = json(&["info", text(&folder.path("square.gltf")), "--json"]);
+    assert_eq!((info["triangles"].as_u64(), info["materials"].as_u64()), (Some(2), Some(1)));
+    assert_eq!(info["cameras"][0]["name"], "eye");
+    let adapters = json(&["adapters", "--json"]);
+    let adapters = adapters["adapters"].as_array().unwrap();
+    assert!(adapters.iter().filter(|adapter| adapter["default"] == true).count() <= 1);
+    assert!(!adapters.is_empty(), "no graphics adapter: these tests need one, lavapipe will do");
+}
+
+#[test]
+fn a_missing_display_is_one_line() {
+    let folder = Folder::new("display");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_fovea"));
+    command.arg(folder.path("square.gltf"));
+    for variable in ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"] {
+        command.env_remove(variable);
+    }
+    if !cfg!(target_os = "linux") {
+        eprintln!("SKIP a_missing_display_is_one_line: only Linux can be without a display");
+        return;
+    }
+    let output = command.output().unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("no display") && message.contains("fovea render"), "{message}");
+}
