@@ -7,6 +7,8 @@
 //! # Non-goals
 //! The tracer knows no window, no user interface and no headset; whoever has those makes the device.
 
+pub mod builtin;
+pub mod environment;
 pub mod import;
 pub mod scene;
 pub mod bvh;

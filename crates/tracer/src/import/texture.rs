@@ -212,7 +212,12 @@ fn read_image(
     };
     // The bytes tell the format; declared media types are often wrong.
     let reader = || ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string());
-    let (width, height) = match reader().and_then(|r| r.into_dimensions().map_err(|e| e.to_string())) {
+    let header = reader().and_then(|mut reader| {
+        // The size is checked below, with an error that says so.
+        reader.no_limits();
+        reader.into_dimensions().map_err(|e| e.to_string())
+    });
+    let (width, height) = match header {
         Ok(size) => size,
         Err(cause) => return Ok(Err(cause)),
     };
