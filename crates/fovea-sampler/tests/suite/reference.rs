@@ -1,6 +1,4 @@
 //! The exact quantiles against 30-digit references, closed forms and the constants of the literature.
-#![expect(clippy::unwrap_used, reason = "a test may panic")]
-
 use fovea_sampler::{Angle, Geometry, RadialDistribution, Reddy2001, model};
 
 /// Rows of a reference file, or `None` (said aloud) if the variable is unset. The file must exist if it is set.
