@@ -5,9 +5,12 @@
 
 mod angle;
 mod error;
+mod eye;
+mod film;
 mod fit;
 mod frame;
 mod inverse;
+pub mod layers;
 pub mod model;
 mod quadrature;
 mod radial;
@@ -20,6 +23,8 @@ pub mod wgsl;
 
 pub use angle::{Angle, Eccentricity};
 pub use error::SamplerError;
+pub use eye::{EyeSample, EyeScreen};
+pub use film::Film;
 pub use frame::{Direction, gaze_frame, gaze_frame_f32};
 pub use inverse::{ErrorBound, ErrorReport, Form, Inverse, MaxRelativeError};
 pub use model::{

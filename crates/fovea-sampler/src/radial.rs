@@ -394,6 +394,9 @@ impl RadialDistribution {
 
     /// The e in the bracket at which the mass from the bracket's start is `target`, of `total`.
     fn solve(&self, target: f64, [lo, hi]: [f64; 2], total: f64) -> f64 {
+        if target <= 0.0 {
+            return lo;
+        }
         let (mut below, mut above) = (lo * lo, hi * hi);
         let mut square = below + (above - below) * (target / total).clamp(0.0, 1.0);
         for _ in 0..100 {

@@ -6,6 +6,9 @@ use crate::{Angle, Geometry, RadialDistribution};
 /// Degree of the interpolant on a piece.
 const DEGREE: usize = 12;
 
+/// Bisections of a smooth stretch at most.
+const MAX_DEPTH: i32 = 9;
+
 /// The exact quantile within the cap as a function of `U = u (1 + kappa)` in `[0, 1]`: piecewise Chebyshev interpolants of
 /// `x / (what x is proportional to at the gaze)` in `s = sqrt(U)`, which is smooth at the gaze for every model.
 ///
@@ -28,16 +31,10 @@ struct Piece {
 impl Truth {
     pub(crate) fn new(distribution: &RadialDistribution) -> Self {
         let stretches = distribution.stretches();
-        let per_stretch = (96 / stretches.len()).max(1);
         let geometry = distribution.geometry();
         let mut pieces = Vec::new();
         for Stretch { start, end, .. } in stretches {
-            let (lo, hi) = (start.sqrt(), end.sqrt());
-            let edge = |i: usize| lo + (hi - lo) * i as f64 / per_stretch as f64;
-            pieces.extend((0..per_stretch).map(|i| {
-                let s = [edge(i), if i + 1 == per_stretch { hi } else { edge(i + 1) }];
-                Piece { s, coefficients: interpolate(distribution, s) }
-            }));
+            refine(distribution, [start.sqrt(), end.sqrt()], MAX_DEPTH, &mut pieces);
         }
         let bins = 4 * pieces.len();
         let first_piece =
@@ -77,6 +74,21 @@ impl Truth {
             Geometry::Sphere => Angle::from_versine(radial).radians(),
             Geometry::Plane => radial,
         }
+    }
+}
+
+/// Bisects `s` until the last coefficients no longer matter.
+fn refine(distribution: &RadialDistribution, s: [f64; 2], depth: i32, pieces: &mut Vec<Piece>) {
+    let coefficients = interpolate(distribution, s);
+    let rest = coefficients[DEGREE].abs() + coefficients[DEGREE - 1].abs();
+    // Only towards the last radius (the antipode's singularity) may pieces shrink without end.
+    let at_limit = if s[1] < 1.0 { depth <= 0 } else { depth <= -16 };
+    if at_limit || rest <= 2e-14 * coefficients[0].abs() {
+        pieces.push(Piece { s, coefficients });
+    } else {
+        let middle = 0.5 * (s[0] + s[1]);
+        refine(distribution, [s[0], middle], depth - 1, pieces);
+        refine(distribution, [middle, s[1]], depth - 1, pieces);
     }
 }
 

@@ -59,6 +59,11 @@ fn search(distribution: &RadialDistribution, truth: &Truth, accuracy: f64) -> Re
             continue;
         }
         let inverse = assemble(distribution, truth, form, fitted);
+        // Neither a map that falls somewhere nor one that lives on cancelling terms.
+        let too_rough = inverse.bound.rounding > 0.2 * accuracy + 5e-7;
+        if inverse.bound.relative_density.is_infinite() || (too_rough && best.is_some()) {
+            continue;
+        }
         if inverse.bound.relative_e <= accuracy {
             return Ok(inverse);
         }
@@ -83,7 +88,11 @@ pub(super) fn with_form(distribution: &RadialDistribution, form: Form) -> Result
     let truth = Truth::new(distribution);
     let fitted = Fitted::new(distribution, &truth, form)
         .ok_or(SamplerError::Unsupported("the fit of this form breaks down for this distribution"))?;
-    Ok(assemble(distribution, &truth, form, fitted))
+    let inverse = assemble(distribution, &truth, form, fitted);
+    if inverse.bound.relative_density.is_infinite() {
+        return Err(SamplerError::Unsupported("the fit of this form is not monotone for this distribution"));
+    }
+    Ok(inverse)
 }
 
 /// Eq. 6 as printed: `80 {0.2330 sqrt u, u <= 0.0965; 0.3136 u^4 + 0.0021 u^3 + 0.3451 u^2 + 0.2984 u + 0.0404}` degrees.

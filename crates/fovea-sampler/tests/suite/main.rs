@@ -1,0 +1,10 @@
+//! The crate's integration tests, one binary: references, certification, statistics, layers, sequences.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+mod certification;
+mod common;
+mod layers;
+mod reference;
+mod robustness;
+mod sequences;
+mod statistics;

@@ -1,0 +1,132 @@
+//! The sequences: their structure, their scrambling, and what they gain over independent points.
+
+use fovea_sampler::sequence::{
+    DIMENSIONS, direction_numbers, hash_combine, independent, owen_scramble, sobol, sobol_owen, strata_order,
+    to_unit_f32,
+};
+use fovea_sampler::{Angle, Film, GazeWarp, Geometry, RadialDistribution, Reddy2001};
+
+#[test]
+fn every_dimension_is_stratified_scrambled_or_not() {
+    for dimension in 0..DIMENSIONS as u32 + 3 {
+        for seed in [1, 0xdead_beef] {
+            for log2 in [1, 4, 8] {
+                // An aligned run of 2^log2 indices that does not start at 0.
+                let start = 5 << log2;
+                let mut seen = vec![false; 1 << log2];
+                for i in 0..1_u32 << log2 {
+                    let stratum = sobol_owen(start + i, dimension, seed) >> (32 - log2);
+                    assert!(!core::mem::replace(&mut seen[stratum as usize], true), "dimension {dimension} at {i}");
+                }
+            }
+        }
+    }
+}
+
+/// Dimensions 0 and 1 are a (0, 2)-sequence in base 2: one point in every elementary interval.
+#[test]
+fn first_two_dimensions_are_a_net_after_scrambling() {
+    for log2 in [4_u32, 8, 10] {
+        for split in 0..=log2 {
+            let mut seen = vec![false; 1 << log2];
+            for i in 0..1_u32 << log2 {
+                let i = i + (3 << log2);
+                let cell = |dimension, bits: u32| {
+                    let value = sobol_owen(i, dimension, 42);
+                    if bits == 0 { 0 } else { value >> (32 - bits) }
+                };
+                let index = (cell(0, split) << (log2 - split)) | cell(1, log2 - split);
+                assert!(!core::mem::replace(&mut seen[index as usize], true), "2^{log2} split {split}");
+            }
+        }
+    }
+}
+
+/// The recurrence's polynomials are primitive, so that no two dimensions are alike, and the first points are the published
+/// ones (0.5; 0.75, 0.25; ...).
+#[test]
+fn direction_numbers_are_triangular_and_distinct() {
+    let numbers = direction_numbers();
+    assert_eq!(numbers.len(), DIMENSIONS * 32);
+    for (dimension, row) in numbers.chunks(32).enumerate() {
+        for (bit, number) in row.iter().enumerate() {
+            assert_eq!(number.trailing_zeros(), 31 - bit as u32, "dimension {dimension} bit {bit}");
+        }
+        assert!(numbers.chunks(32).take(dimension).all(|other| other != row));
+    }
+    // Third and fourth points of dimension 2 (1-based 3), by Joe and Kuo's recurrence: 0.25, 0.75 of the Gray code's order.
+    let unit = |index, dimension| f64::from(sobol(index, dimension)) / 4_294_967_296.0;
+    let points: Vec<[f64; 3]> = (0..4).map(|i| [unit(i, 0), unit(i, 1), unit(i, 2)]).collect();
+    assert_eq!(points, [[0.0, 0.0, 0.0], [0.5, 0.5, 0.5], [0.25, 0.75, 0.75], [0.75, 0.25, 0.25]]);
+}
+
+/// Over seeds the scrambled first point is uniform and seeds differ.
+#[test]
+fn scrambling_randomises() {
+    let mut counts = [0_u32; 64];
+    for seed in 0..64_000 {
+        counts[(owen_scramble(0, hash_combine(seed, 7)) >> 26) as usize] += 1;
+    }
+    let statistic: f64 = counts.iter().map(|c| (f64::from(*c) - 1000.0).powi(2) / 1000.0).sum();
+    assert!(crate::common::chi_squared_p(statistic, 63.0) > 1e-3, "{statistic}");
+    assert_ne!(sobol_owen(3, 1, 1), sobol_owen(3, 1, 2));
+    assert_ne!(independent(3, 1, 1), independent(3, 2, 1));
+}
+
+#[test]
+fn unit_interval_is_half_open_and_exact() {
+    assert_eq!(to_unit_f32(0), 0.0);
+    assert_eq!(to_unit_f32(u32::MAX), 1.0 - 2f32.powi(-24));
+    assert_eq!(to_unit_f32(1 << 8), 2f32.powi(-24));
+}
+
+#[test]
+fn strata_order_permutes_the_batch_and_keeps_neighbours_close() {
+    let log2 = 10;
+    let mut seen = vec![false; 1 << log2];
+    for thread in 0..1 << log2 {
+        seen[strata_order(thread, log2) as usize] = true;
+        // Threads of a group of 64 share a sixteenth of dimension 0.
+        let group = sobol(strata_order(thread, log2), 0) >> 28;
+        assert_eq!(group, thread >> 6);
+    }
+    assert!(seen.iter().all(|s| *s));
+    assert_eq!(strata_order(0, 0), 0);
+    assert_eq!(strata_order(1, 32), 1 << 31);
+}
+
+/// Variance of the number of samples a pixel near the gaze, over seeds: the sequence must beat independent points by far.
+#[test]
+fn sobol_evens_out_the_samples_in_the_fovea() {
+    let cap = Angle::from_degrees(80.0);
+    let distribution = RadialDistribution::new(Reddy2001, Geometry::Sphere, cap, 0.002).unwrap();
+    let warp = GazeWarp::new(distribution);
+    let film = Film::equirectangular(1024, 512).unwrap();
+    let variance = |value: fn(u32, u32, u32) -> u32| {
+        let (mut sum, mut squares, mut pixels) = (0.0, 0.0, 0.0);
+        for seed in 0..8 {
+            let mut counts = vec![0_u32; 1024 * 512];
+            for index in 0..1 << 16 {
+                let u = [to_unit_f32(value(index, 0, seed)), to_unit_f32(value(index, 1, seed))];
+                let d = warp.sample_f32(u, [0.0, 0.0, -1.0]).map(f64::from);
+                let [x, y] = film.pixel(d).unwrap();
+                counts[(y * 1024 + x) as usize] += 1;
+            }
+            // The pixels within 4 degrees: a flat expectation, but for the pixels' own sizes (0.1 %).
+            for y in 256 - 8..256 + 8 {
+                for x in 512 - 8..512 + 8 {
+                    let count = f64::from(counts[y * 1024 + x]);
+                    (sum, squares, pixels) = (sum + count, squares + count * count, pixels + 1.0);
+                }
+            }
+        }
+        let mean: f64 = sum / pixels;
+        (mean, squares / pixels - mean * mean)
+    };
+    let (mean, poisson) = variance(independent);
+    let (sobol_mean, even) = variance(sobol_owen);
+    assert!((mean / sobol_mean - 1.0).abs() < 0.02, "{mean} {sobol_mean}");
+    // Independent counts are Poisson's: variance = mean, over 2048 pixels to about 3 %.
+    assert!((poisson / mean - 1.0).abs() < 0.15, "{poisson} of {mean}");
+    assert!(even < 0.35 * poisson, "{even} against {poisson} at {mean} samples a pixel");
+}
