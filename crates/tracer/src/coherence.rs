@@ -28,7 +28,8 @@ pub fn order_columns(log2_size: u32) -> [u32; ORDER_BITS] {
     let mut rows: Vec<(u32, u32)> = (0..k).map(|i| (cell_of_bit(i), 1 << i)).collect();
     // Gauss-Jordan over GF(2): each pair says that a set of index bits moves to a set of thread bits.
     for bit in 0..k {
-        let pivot = (bit..k).find(|&r| rows[r].0 >> bit & 1 == 1).expect("Sobol dimensions 0 and 1 are a (0,2)-sequence");
+        let pivot =
+            (bit..k).find(|&r| rows[r].0 >> bit & 1 == 1).expect("Sobol dimensions 0 and 1 are a (0,2)-sequence");
         rows.swap(bit, pivot);
         let (cell, index) = rows[bit];
         for (r, row) in rows.iter_mut().enumerate() {
@@ -52,7 +53,11 @@ mod tests {
     use super::*;
 
     fn index_of_thread(columns: &[u32; ORDER_BITS], thread: u32) -> u32 {
-        columns.iter().enumerate().filter(|(bit, _)| thread >> bit & 1 == 1).fold(0, |index, (_, column)| index ^ column)
+        columns
+            .iter()
+            .enumerate()
+            .filter(|(bit, _)| thread >> bit & 1 == 1)
+            .fold(0, |index, (_, column)| index ^ column)
     }
 
     /// A permutation, and the first `2^(k-6)` parts of 64 threads each stay in a cell of their own.

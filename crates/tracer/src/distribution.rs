@@ -261,11 +261,9 @@ pub fn film_direction(film: &FilmOptions, x: u32, y: u32) -> Vec3 {
             let (sin_lat, cos_lat) = (std::f64::consts::PI * (0.5 - v)).sin_cos();
             glam::DVec3::new(cos_lat * sin_lon, sin_lat, -cos_lat * cos_lon).as_vec3()
         }
-        FilmMapping::Perspective { half_extent } => Vec3::new(
-            (2.0 * u - 1.0) as f32 * half_extent[0],
-            (1.0 - 2.0 * v) as f32 * half_extent[1],
-            -1.0,
-        )
-        .normalize(),
+        FilmMapping::Perspective { half_extent } => {
+            Vec3::new((2.0 * u - 1.0) as f32 * half_extent[0], (1.0 - 2.0 * v) as f32 * half_extent[1], -1.0)
+                .normalize()
+        }
     }
 }

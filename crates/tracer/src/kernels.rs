@@ -1,12 +1,20 @@
 //! Kernels: WESL modules composed for a [`KernelKey`] into WGSL, and the pipelines made of them.
 
-use std::{borrow::Cow, fmt, sync::OnceLock};
+use std::{
+    borrow::Cow,
+    collections::BTreeMap,
+    fmt,
+    sync::{Arc, OnceLock},
+};
 
 use fovea_sampler::{Inverse, sequence};
 use thiserror::Error;
 use wesl::{CompileOptions, ModulePath, VirtualResolver, Wesl};
 
-use crate::features::{Feature, SceneFeatures};
+use crate::{
+    features::{Feature, SceneFeatures},
+    scene::ContentHash,
+};
 
 pub mod layout;
 pub mod pipelines;
@@ -109,8 +117,8 @@ pub struct KernelKey {
     pub features: SceneFeatures,
     /// Numbers that the text contains.
     pub constants: KernelConstants,
-    /// WGSL of the sampler: radial inverse and warp.
-    pub sampler: SamplerModule,
+    /// What the kernel is composed of.
+    pub sources: Arc<ShaderSources>,
 }
 
 /// Numbers that a kernel's text contains.
@@ -124,29 +132,64 @@ pub struct KernelConstants {
     pub environment_cells: [u32; 2],
 }
 
-/// WGSL text of a radial inverse with its name.
-#[derive(Clone, PartialEq, Eq, Hash)]
-pub struct SamplerModule {
-    name: String,
-    text: String,
+/// The texts that kernels are composed of: the embedded modules, and the sampler's for one radial inverse.
+///
+/// Tests plant faults and developers try changes by [`ShaderSources::with_module`]; everything else uses the embedded
+/// texts.
+#[derive(Clone)]
+pub struct ShaderSources {
+    sampler_name: String,
+    modules: BTreeMap<String, Cow<'static, str>>,
+    hash: ContentHash,
 }
 
-impl SamplerModule {
-    /// The module of an inverse.
+impl ShaderSources {
+    /// The embedded modules with the sampler of an inverse.
     pub fn new(inverse: &Inverse) -> Self {
-        let text = format!(
-            "{}\n{}",
-            fovea_sampler::wgsl::radial_module(inverse),
-            fovea_sampler::wgsl::sequence_module()
-        );
-        let name = inverse.name().replace(|c: char| !c.is_ascii_alphanumeric(), "-");
-        Self { name, text }
+        let modules = MODULES.iter().map(|&(name, text)| (name.to_string(), Cow::Borrowed(text))).collect();
+        Self { sampler_name: String::new(), modules, hash: ContentHash::default() }.with_inverse(inverse)
+    }
+
+    /// These modules with the sampler of another inverse.
+    #[must_use]
+    pub fn with_inverse(mut self, inverse: &Inverse) -> Self {
+        self.sampler_name = inverse.name().replace(|c: char| !c.is_ascii_alphanumeric(), "-");
+        let radial = fovea_sampler::wgsl::radial_module(inverse);
+        self.with_module("sampler", radial + "\n" + &fovea_sampler::wgsl::sequence_module())
+    }
+
+    /// The text of a module named by its path below `shaders/`, such as `path::trace`.
+    pub fn module(&self, name: &str) -> Option<&str> {
+        self.modules.get(name).map(AsRef::as_ref)
+    }
+
+    /// These modules with one replaced.
+    #[must_use]
+    pub fn with_module(mut self, name: &str, text: String) -> Self {
+        self.modules.insert(name.to_string(), Cow::Owned(text));
+        let parts: Vec<&[u8]> = self.modules.iter().flat_map(|(n, t)| [n.as_bytes(), t.as_bytes()]).collect();
+        self.hash = ContentHash::of(&parts);
+        self
     }
 }
 
-impl fmt::Debug for SamplerModule {
+impl PartialEq for ShaderSources {
+    fn eq(&self, other: &Self) -> bool {
+        self.hash == other.hash
+    }
+}
+
+impl Eq for ShaderSources {}
+
+impl std::hash::Hash for ShaderSources {
+    fn hash<H: std::hash::Hasher>(&self, state: &mut H) {
+        self.hash.hash(state);
+    }
+}
+
+impl fmt::Debug for ShaderSources {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.name)
+        write!(f, "ShaderSources({}, {})", self.sampler_name, self.hash)
     }
 }
 
@@ -155,7 +198,7 @@ impl fmt::Display for KernelKey {
         let name = self.kernel.module().replace("::", "-");
         match self.kernel {
             Kernel::Trace | Kernel::Generate => {
-                write!(f, "{name}.{}.{}.stack{}", self.features, self.sampler.name, self.constants.stack_size)
+                write!(f, "{name}.{}.{}.stack{}", self.features, self.sources.sampler_name, self.constants.stack_size)
             }
             _ => write!(f, "{name}"),
         }
@@ -180,10 +223,9 @@ pub fn compose(key: &KernelKey) -> Result<String, ComposeError> {
         format!("package::{module}").parse().map_err(|error| fail(format!("{error}")))
     };
     let mut resolver = VirtualResolver::new();
-    for (module, text) in MODULES {
-        resolver.add_module(path(module)?, Cow::Borrowed(*text));
+    for (module, text) in &key.sources.modules {
+        resolver.add_module(path(module)?, Cow::Borrowed(text));
     }
-    resolver.add_module(path("sampler")?, Cow::Borrowed(&key.sampler.text));
     resolver.add_module(path("constants")?, Cow::Owned(constants_module(&key.constants)));
     let mut wesl = Wesl::new_barebones().set_custom_resolver(resolver);
     wesl.set_options(CompileOptions { validate: false, lazy: true, strip: true, ..Default::default() });

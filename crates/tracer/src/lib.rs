@@ -8,16 +8,16 @@
 //! The tracer knows no window, no user interface and no headset; whoever has those makes the device.
 
 pub mod builtin;
-pub mod environment;
-pub mod import;
-pub mod scene;
 pub mod bvh;
 pub mod coherence;
 pub mod distribution;
+pub mod environment;
 pub mod features;
 pub mod film;
 pub mod gpu;
+pub mod import;
 pub mod kernels;
 pub mod renderer;
+pub mod scene;
 pub mod upload;
 pub mod view;

@@ -12,7 +12,7 @@ use crate::{
     film::{Film, FilmMapping, FilmOptions, FilmSnapshot, ReadError},
     gpu::Gpu,
     kernels::{
-        self, Kernel, KernelConstants, KernelKey, SamplerModule, WORKGROUP_SIZE,
+        self, Kernel, KernelConstants, KernelKey, ShaderSources, WORKGROUP_SIZE,
         layout::{self, BatchParams, SampleRecord},
         pipelines::{KernelError, Pipeline, PipelineCache},
     },
@@ -147,7 +147,7 @@ pub struct Renderer {
     pose: FilmPose,
     distribution: Distribution,
     pixel_list: wgpu::Buffer,
-    sampler: SamplerModule,
+    sources: Arc<ShaderSources>,
     pipelines: PipelineCache,
     bound: Option<BoundKernels>,
     /// One per slab of the film: they differ in the slab alone.
@@ -186,7 +186,12 @@ impl Renderer {
         let film = Film::new(gpu, options.film).ok_or_else(too_large)?;
         let buffer = |label, size: u64, usage| {
             let usage = usage | wgpu::BufferUsages::COPY_DST;
-            gpu.device.create_buffer(&wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false })
+            gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                size,
+                usage,
+                mapped_at_creation: false,
+            })
         };
         let params = film
             .slabs
@@ -202,7 +207,7 @@ impl Renderer {
         let direction_numbers =
             buffer("Sobol direction numbers", size_of_val(numbers) as u64, wgpu::BufferUsages::UNIFORM);
         gpu.queue.write_buffer(&direction_numbers, 0, bytemuck::cast_slice(numbers));
-        let sampler = SamplerModule::new(distribution.inverse());
+        let sources = Arc::new(ShaderSources::new(distribution.inverse()));
         let mut renderer = Self {
             view: ViewRenderer::new(gpu),
             pixel_list: buffer("pixel list", 16, wgpu::BufferUsages::STORAGE),
@@ -213,7 +218,7 @@ impl Renderer {
             scene: None,
             pose: FilmPose::default(),
             distribution,
-            sampler,
+            sources,
             pipelines: PipelineCache::default(),
             bound: None,
             params,
@@ -265,15 +270,10 @@ impl Renderer {
     pub fn set_distribution(&mut self, distribution: Distribution) -> Result<(), RenderError> {
         let before = std::mem::replace(&mut self.distribution, distribution);
         if !Arc::ptr_eq(before.inverse(), self.distribution.inverse()) {
-            let sampler = SamplerModule::new(self.distribution.inverse());
-            if sampler != self.sampler {
-                let old = std::mem::replace(&mut self.sampler, sampler);
-                if let Err(error) = self.rebind() {
-                    self.sampler = old;
-                    self.distribution = before;
-                    self.rebind()?;
-                    return Err(error);
-                }
+            let sources = (*self.sources).clone().with_inverse(self.distribution.inverse());
+            if let Err(error) = self.set_shaders(sources) {
+                self.distribution = before;
+                return Err(error);
             }
         }
         self.upload_pixel_list();
@@ -294,6 +294,27 @@ impl Renderer {
         let in_film = self.pose.world_from_film.inverse() * direction;
         let Some(pixel) = self.options.film.pixel_of(in_film) else { return Ok(0.0) };
         Ok(self.film.samples_near(&self.gpu, pixel, radius)?)
+    }
+
+    /// The texts that the kernels are composed of.
+    pub fn shaders(&self) -> &ShaderSources {
+        &self.sources
+    }
+
+    /// Composes the kernels of other texts from now on. The film goes on.
+    ///
+    /// # Errors
+    /// When they do not compose or compile; the last good kernels then stay.
+    pub fn set_shaders(&mut self, sources: ShaderSources) -> Result<(), RenderError> {
+        if sources == *self.sources {
+            return Ok(());
+        }
+        let before = std::mem::replace(&mut self.sources, Arc::new(sources));
+        let result = if self.scene.is_some() { self.bind() } else { Ok(()) };
+        if result.is_err() {
+            self.sources = before;
+        }
+        result
     }
 
     /// Starts the film anew; what is shown meanwhile is the old picture.
@@ -454,7 +475,8 @@ impl Renderer {
     pub fn key(&self, kernel: Kernel) -> KernelKey {
         let perspective = matches!(self.options.film.mapping, FilmMapping::Perspective { .. });
         let scene = self.scene.as_ref();
-        let features = if kernel == Kernel::Trace { scene.map(|s| s.features).unwrap_or_default() } else { Default::default() };
+        let features =
+            if kernel == Kernel::Trace { scene.map(|s| s.features).unwrap_or_default() } else { Default::default() };
         KernelKey {
             kernel,
             features: features.with(Feature::PerspectiveFilm, perspective),
@@ -463,7 +485,7 @@ impl Renderer {
             } else {
                 KernelConstants::default()
             },
-            sampler: self.sampler.clone(),
+            sources: self.sources.clone(),
         }
     }
 
@@ -538,10 +560,6 @@ impl Renderer {
             }
         }
         self.gpu.queue.write_buffer(&self.pixel_list, 0, bytes);
-    }
-
-    fn rebind(&mut self) -> Result<(), RenderError> {
-        if self.scene.is_some() { self.bind() } else { Ok(()) }
     }
 
     fn bind(&mut self) -> Result<(), RenderError> {

@@ -103,7 +103,8 @@ impl ViewRenderer {
             usage: BufferUsages::STORAGE | BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("stale view") });
+        let mut encoder =
+            gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("stale view") });
         encoder.copy_buffer_to_buffer(pyramid, 0, &copy, 0, size);
         gpu.queue.submit([encoder.finish()]);
         self.stale = Some((copy, view, self.size));
@@ -199,8 +200,7 @@ impl ViewRenderer {
             };
             for &(level, (fine, coarse)) in &pairs {
                 let params = upload(level_params(level, fine, coarse));
-                let group =
-                    pull.bind(device, 0, &[(0, params.as_entire_binding()), (2, pyramid.as_entire_binding())]);
+                let group = pull.bind(device, 0, &[(0, params.as_entire_binding()), (2, pyramid.as_entire_binding())]);
                 pull.dispatch(&mut pass, &[&group], tiles(coarse.size));
             }
             for &(level, (fine, coarse)) in pairs.iter().rev() {
@@ -220,11 +220,7 @@ impl ViewRenderer {
             }
         }
         let finished_bytes = u64::from(settings.size[0]) * u64::from(settings.size[1]) * 16;
-        let finished = wgpu::BufferBinding {
-            buffer: pyramid,
-            offset: 0,
-            size: wgpu::BufferSize::new(finished_bytes),
-        };
+        let finished = wgpu::BufferBinding { buffer: pyramid, offset: 0, size: wgpu::BufferSize::new(finished_bytes) };
         let group = present.bind(
             device,
             0,

@@ -234,8 +234,8 @@ pub mod codes {
     pub const LAYER_GAZE_AT_EYE: u32 = 5;
     pub const NONE: u32 = u32::MAX;
     pub const INSTANCE_MIRRORED: u32 = 1;
-    pub const INSTANCE_ALPHA: u32 = 2;
-    pub const INSTANCE_STATIC: u32 = 4;
+    pub const INSTANCE_STATIC: u32 = 2;
+    pub const TRIANGLE_ALPHA: u32 = 0x8000_0000;
     pub const MATERIAL_DOUBLE_SIDED: u32 = 1;
     pub const MATERIAL_ALPHA_MASK: u32 = 2;
     pub const MATERIAL_ALPHA_BLEND: u32 = 4;

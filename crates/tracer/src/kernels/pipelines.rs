@@ -137,7 +137,12 @@ impl Pipeline {
     ///
     /// # Panics
     /// On the render pipeline of [`Kernel::Present`], which is a bug in this crate.
-    pub fn dispatch(&self, pass: &mut wgpu::ComputePass<'_>, groups: &[&Option<wgpu::BindGroup>], workgroups: [u32; 2]) {
+    pub fn dispatch(
+        &self,
+        pass: &mut wgpu::ComputePass<'_>,
+        groups: &[&Option<wgpu::BindGroup>],
+        workgroups: [u32; 2],
+    ) {
         let PipelineKind::Compute(pipeline) = &self.kind else { panic!("{} is no compute kernel", self.label) };
         pass.set_pipeline(pipeline);
         for (index, group) in groups.iter().enumerate() {

@@ -30,7 +30,7 @@ struct Piece {
     positions: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
     vertices: Vec<layout::Vertex>,
-    /// Per triangle: its number in the mesh that it came from.
+    /// Per triangle: its number in the mesh that it came from, and [`codes::TRIANGLE_ALPHA`] where a hit needs a test.
     numbers: Vec<u32>,
 }
 
@@ -39,7 +39,7 @@ pub(super) struct Geometry {
     pub nodes: Vec<CwBvhNode>,
     /// Nine coordinates a triangle, in leaf order.
     pub positions: Vec<[f32; 9]>,
-    /// Per triangle: its three vertices and its number in its mesh.
+    /// Per triangle: its three vertices, and its number in its mesh with [`codes::TRIANGLE_ALPHA`].
     pub triangles: Vec<[u32; 4]>,
     pub vertices: Vec<layout::Vertex>,
     /// Entries of the upper level in leaf order, then the parts of the static mesh.
@@ -65,7 +65,7 @@ impl Geometry {
 
         // Entries of the upper level, in scene order for now; part numbers are known once the leaf order is.
         let entry_count = placed.len() + usize::from(!fixed.is_empty());
-        let mut pieces: Vec<Piece> = meshes.par_iter().map(|&m| own_piece(&scene.meshes[m as usize])).collect();
+        let mut pieces: Vec<Piece> = meshes.par_iter().map(|&m| own_piece(scene, m)).collect();
         if !fixed.is_empty() {
             pieces.push(static_piece(scene, &fixed, entry_count as u32));
         }
@@ -107,12 +107,12 @@ impl Geometry {
                 }
                 None => (*roots.last().expect("the static piece is the last"), None),
             };
-            geometry.instances.push(encode_instance(scene, instance, &entry.world_from_mesh, root));
+            geometry.instances.push(encode_instance(instance, &entry.world_from_mesh, root));
             geometry.sources.push(entry.source);
         }
         for &source in &fixed {
             let instance = &scene.instances[source as usize];
-            geometry.instances.push(encode_instance(scene, Some(instance), &Affine3A::IDENTITY, codes::NONE));
+            geometry.instances.push(encode_instance(Some(instance), &Affine3A::IDENTITY, codes::NONE));
             geometry.sources.push(Some(source));
         }
         if geometry.is_single_level {
@@ -130,7 +130,7 @@ impl Geometry {
     /// Number in its mesh and slot of every triangle of the piece whose root node this is.
     pub(super) fn slots_below(&self, root: u32) -> impl Iterator<Item = (u32, u32)> + '_ {
         let range = self.pieces.iter().find(|(r, _)| *r == root).map_or(0..0, |(_, range)| range.clone());
-        range.map(|slot| (self.triangles[slot as usize][3], slot))
+        range.map(|slot| (self.triangles[slot as usize][3] & !codes::TRIANGLE_ALPHA, slot))
     }
 
     /// Appends a piece in the leaf order of its hierarchy; returns the index of its root node.
@@ -180,14 +180,25 @@ fn split(scene: &Scene) -> (Vec<u32>, Vec<u32>) {
     })
 }
 
-fn own_piece(mesh: &Mesh) -> Piece {
+fn own_piece(scene: &Scene, mesh: u32) -> Piece {
+    let has_alpha = scene.instances.iter().any(|i| i.mesh == mesh && has_alpha(scene, i));
+    let mesh = &*scene.meshes[mesh as usize];
     Piece {
         hash: mesh.hash,
         positions: mesh.positions.clone(),
         triangles: mesh.triangles.clone(),
         vertices: vertices::encode(mesh, None, codes::NONE).collect(),
-        numbers: (0..mesh.triangles.len() as u32).collect(),
+        numbers: numbers(mesh, has_alpha),
     }
+}
+
+fn numbers(mesh: &Mesh, has_alpha: bool) -> Vec<u32> {
+    let flag = if has_alpha { codes::TRIANGLE_ALPHA } else { 0 };
+    (0..mesh.triangles.len() as u32).map(|number| number | flag).collect()
+}
+
+fn has_alpha(scene: &Scene, instance: &Instance) -> bool {
+    scene.materials[instance.material as usize].alpha_mode != AlphaMode::Opaque
 }
 
 /// All fixed instances in world space; their entries in the instance table follow the `first_part` others.
@@ -204,9 +215,13 @@ fn static_piece(scene: &Scene, fixed: &[u32], first_part: u32) -> Piece {
                 hash: mesh.hash.mix(bytemuck::cast_slice(&matrix)),
                 positions: mesh.positions.iter().map(|&p| instance.world_from_mesh.transform_point3(p)).collect(),
                 // A mirror reverses the winding; in world space the order of corners says the same.
-                triangles: mesh.triangles.iter().map(|&[a, b, c]| if mirrored { [a, c, b] } else { [a, b, c] }).collect(),
+                triangles: mesh
+                    .triangles
+                    .iter()
+                    .map(|&[a, b, c]| if mirrored { [a, c, b] } else { [a, b, c] })
+                    .collect(),
                 vertices: vertices::encode(mesh, Some(&instance.world_from_mesh), first_part + part as u32).collect(),
-                numbers: (0..mesh.triangles.len() as u32).collect(),
+                numbers: numbers(mesh, has_alpha(scene, instance)),
             }
         })
         .collect();
@@ -228,13 +243,7 @@ fn static_piece(scene: &Scene, fixed: &[u32], first_part: u32) -> Piece {
     whole
 }
 
-fn encode_instance(
-    scene: &Scene,
-    instance: Option<&Instance>,
-    world_from_mesh: &Affine3A,
-    root_node: u32,
-) -> layout::Instance {
-    let alpha = instance.is_some_and(|i| scene.materials[i.material as usize].alpha_mode != AlphaMode::Opaque);
+fn encode_instance(instance: Option<&Instance>, world_from_mesh: &Affine3A, root_node: u32) -> layout::Instance {
     let mirrored = world_from_mesh.matrix3.determinant() < 0.0;
     let flag = |set: bool, bit: u32| if set { bit } else { 0 };
     layout::Instance {
@@ -243,9 +252,7 @@ fn encode_instance(
         root_node,
         material: instance.map_or(codes::NONE, |i| i.material),
         first_light: codes::NONE,
-        flags: flag(mirrored, codes::INSTANCE_MIRRORED)
-            | flag(alpha, codes::INSTANCE_ALPHA)
-            | flag(instance.is_none(), codes::INSTANCE_STATIC),
+        flags: flag(mirrored, codes::INSTANCE_MIRRORED) | flag(instance.is_none(), codes::INSTANCE_STATIC),
     }
 }
 

@@ -46,7 +46,8 @@ impl LightTable {
                     std::mem::swap(&mut b, &mut c);
                 }
                 let (edge_1, edge_2) = (b - a, c - a);
-                powers.push(radiance * std::f64::consts::PI * 0.5 * edge_1.as_dvec3().cross(edge_2.as_dvec3()).length());
+                powers
+                    .push(radiance * std::f64::consts::PI * 0.5 * edge_1.as_dvec3().cross(edge_2.as_dvec3()).length());
                 lights.push(layout::Light {
                     position: a.to_array(),
                     edge_1: edge_1.to_array(),
@@ -90,6 +91,7 @@ fn enter_triangles(geometry: &Geometry, lights: &mut [layout::Light]) {
         if part != codes::NONE {
             let first_light = geometry.instances[part as usize].first_light;
             if first_light != codes::NONE {
+                let number = number & !codes::TRIANGLE_ALPHA;
                 lights[(first_light + number) as usize].triangle = slot as u32;
             }
         }
