@@ -17,6 +17,13 @@ fn main() {
     println!("import {:?} {:?}", t.elapsed(), report.warnings.len());
     let bg: f32 = args[2].parse().unwrap();
     scene.environment = tracer::scene::Environment::Constant(Vec3::splat(bg));
+    let x = std::env::var("X").unwrap_or_default();
+    for m in &mut scene.materials { let m = Arc::make_mut(m);
+        if x.contains('a') { m.alpha_mode = tracer::scene::AlphaMode::Opaque; }
+        if x.contains('n') { m.normal_texture = None; }
+        if x.contains('t') { m.base_color_texture = None; m.metallic_roughness_texture = None; m.emissive_texture = None; }
+        if x.contains('l') { scene.lights.clear(); }
+    }
     if std::env::var("MERGE").is_ok() {
         let mut m = (*scene.meshes[0]).clone();
         m.positions.clear();

@@ -602,7 +602,7 @@ impl Renderer {
         self.write_params(0)?;
         let bound = self.bound.as_ref().ok_or(RenderError::NoScene)?;
         let mut encoder = self.encoder("warm-up");
-        bound.record(&mut encoder, 1);
+        bound.record(&mut encoder, 0);
         self.gpu.queue.submit([encoder.finish()]);
         self.gpu.wait().map_err(|_| RenderError::DeviceLost)
     }

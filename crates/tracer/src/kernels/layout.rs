@@ -241,9 +241,8 @@ pub mod codes {
     pub const MATERIAL_ALPHA_BLEND: u32 = 4;
     pub const MATERIAL_UNLIT: u32 = 8;
     pub const MATERIAL_SOLID: u32 = 16;
-    pub const TEXTURE_SRGB: u32 = 1;
-    pub const TEXTURE_LINEAR_FILTER: u32 = 2;
-    pub const TEXTURE_UV1: u32 = 4;
+    pub const TEXTURE_LINEAR_FILTER: u32 = 1;
+    pub const TEXTURE_UV1: u32 = 2;
     pub const WRAP_REPEAT: u32 = 0;
     pub const WRAP_MIRROR: u32 = 1;
     pub const WRAP_CLAMP: u32 = 2;

@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::{
     kernels::layout::{self, codes},
-    scene::{AlphaMode, Material, Scene, TexelEncoding, TextureRef, WrapMode},
+    scene::{AlphaMode, Material, Scene, TextureRef, WrapMode},
 };
 
 /// Materials and texture slots; `offsets` are the textures' first texels in their heap.
@@ -72,7 +72,6 @@ fn encode_slot(scene: &Scene, offsets: &[u32], reference: &TextureRef) -> layout
         WrapMode::MirroredRepeat => codes::WRAP_MIRROR,
         WrapMode::ClampToEdge => codes::WRAP_CLAMP,
     };
-    let srgb = if texture.encoding == TexelEncoding::Srgb { codes::TEXTURE_SRGB } else { 0 };
     let filter = if reference.linear_filter { codes::TEXTURE_LINEAR_FILTER } else { 0 };
     let uv = if reference.uv_set == 1 { codes::TEXTURE_UV1 } else { 0 };
     let row = |r: [f32; 3]| [r[0], r[1], r[2], 0.0];
@@ -81,7 +80,7 @@ fn encode_slot(scene: &Scene, offsets: &[u32], reference: &TextureRef) -> layout
         matrix_v: row(reference.texture_from_uv[1]),
         offset: offsets[reference.texture as usize],
         size: (texture.width - 1) | (texture.height - 1) << 16,
-        flags: srgb | filter | uv | wrap(reference.wrap[0]) << 8 | wrap(reference.wrap[1]) << 10,
+        flags: filter | uv | wrap(reference.wrap[0]) << 8 | wrap(reference.wrap[1]) << 10,
         unused: 0,
     }
 }
