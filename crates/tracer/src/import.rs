@@ -32,6 +32,7 @@ mod error;
 mod graph;
 mod json;
 mod material;
+mod meshopt;
 mod pose;
 mod primitive;
 mod report;
