@@ -1,7 +1,7 @@
 //! glTF 2.0 import: a `.glb` or `.gltf` file becomes an immutable [`Scene`] and a report of what was met.
 //!
 //! # What becomes of what
-//! - Every (node, primitive) with triangles is one [`Instance`]; primitives that share their data share one [`Mesh`],
+//! - Every (node, primitive) with triangles is one [`Instance`](crate::scene::Instance); primitives that share their data share one [`Mesh`],
 //!   also across glTF meshes. Materials and textures that the chosen scene does not use are not loaded.
 //! - Node transforms are composed in f64. When the scene's centre is farther from the file's origin than
 //!   [`REBASE_RATIO`] times its diagonal, that centre becomes [`Scene::origin_in_file`] and all is stored relative to it;

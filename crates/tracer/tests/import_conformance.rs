@@ -105,7 +105,7 @@ fn paper_scenes_have_their_cameras_lights_and_textures() {
         );
         assert!(matches!(scene.environment, Environment::Constant(glam::Vec3::ZERO)), "{file} has light of its own");
         assert_eq!(scene.origin_in_file, glam::DVec3::ZERO, "{file}: ordinary scenes keep their coordinates");
-        println!("{file}: {:?}", report.stage_seconds);
+        eprintln!("{file}: {:?}", report.stage_seconds);
     }
     let (scene, _) = load_gltf(&folder.join("paper/bmw.glb"), &ImportOptions::default()).unwrap();
     let camera = &scene.cameras[0];
