@@ -12,6 +12,7 @@
 //! - Skins and morph targets are baked at the file's own pose or at [`ImportOptions::time_secs`].
 //! - Missing normals become flat ones; missing tangents are made by MikkTSpace where a material needs them.
 //! - A missing or undecodable image becomes one neutral texel (black for emission, flat for normals, else white).
+//! - Lights fall off by the inverse square alone: their `range`, a hint for rasterisers, is not used.
 //! - Without any light, a neutral sky lights the scene and the report says so.
 
 use std::collections::BTreeMap;

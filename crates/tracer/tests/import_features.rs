@@ -91,6 +91,53 @@ fn integers_strides_and_sparse_accessors() {
     assert_close(&file.scene().meshes[0].positions, &[Vec3::ZERO, Vec3::X, Vec3::Y]);
 }
 
+/// Version 0 of the attribute codec, every delta stored as a full byte: no compression, but a valid stream.
+fn meshopt_stream(data: &[u8], stride: usize) -> Vec<u8> {
+    let count = data.len() / stride;
+    assert!(count <= 16, "one group");
+    let mut stream = vec![0xA0];
+    for byte in 0..stride {
+        stream.push(3);
+        let mut previous = 0u8;
+        for element in 0..16 {
+            let value = if element < count { data[element * stride + byte] } else { previous };
+            let delta = value.wrapping_sub(previous) as i8;
+            stream.push(((delta << 1) ^ (delta >> 7)) as u8);
+            previous = value;
+        }
+    }
+    stream.resize(stream.len() + 32.max(stride), 0);
+    stream
+}
+
+#[test]
+fn meshopt_compressed_views() {
+    for name in ["EXT_meshopt_compression", "KHR_meshopt_compression"] {
+        let mut file = File::triangle();
+        let stream = meshopt_stream(&file.bin[..36], 12);
+        let (length, offset) = (stream.len(), file.bin.len());
+        file.bin.extend(stream);
+        file.bin.resize(file.bin.len().next_multiple_of(4), 0);
+        // The uncompressed form is in a buffer that exists in name only.
+        let placeholder = json!({"byteLength": 36, "extensions": {name: {"fallback": true}}});
+        file.json["buffers"] = json!([{"byteLength": file.bin.len()}, placeholder]);
+        let mut compressed = json!({"buffer": 0, "byteOffset": offset, "byteLength": length, "byteStride": 12, "count": 3, "mode": "ATTRIBUTES"});
+        let view = |compressed: &serde_json::Value| json!({"buffer": 1, "byteLength": 36, "byteStride": 12, "extensions": {name: compressed}});
+        file.json["bufferViews"][0] = view(&compressed);
+        file.json["extensionsRequired"] = json!([name]);
+        assert_close(&file.scene().meshes[0].positions, &[Vec3::ZERO, Vec3::X, Vec3::Y]);
+        compressed["byteLength"] = json!(length - 1);
+        file.json["bufferViews"][0] = view(&compressed);
+        assert!(file.error().contains("buffer view 0: the compressed stream"), "{}", file.error());
+        compressed["count"] = json!(1u64 << 40);
+        file.json["bufferViews"][0] = view(&compressed);
+        assert!(file.error().contains("buffer view 0: 1099511627776 elements of 12 bytes exceed the limit"));
+        compressed["byteStride"] = json!(6);
+        file.json["bufferViews"][0] = view(&compressed);
+        assert!(file.error().contains("buffer view 0: property 'byteStride' is 6"), "{}", file.error());
+    }
+}
+
 #[test]
 fn hierarchy_instancing_and_sharing() {
     let mut file = File::triangle();
