@@ -123,3 +123,76 @@ fn decode_exr(file: &Path, bytes: &[u8]) -> Result<Raw, EnvironmentError> {
     let (width, height) = (read.layer_data.size.width(), read.layer_data.size.height());
     Ok(Raw { width, height, pixels: read.layer_data.channel_data.pixels.concat() })
 }
+
+#[cfg(test)]
+mod tests {
+    use exr::prelude::{Image, SpecificChannels, WritableImage};
+
+    use super::*;
+
+    const FILE: &str = "sky";
+
+    fn hdr(width: usize, height: usize, pixels: &[[f32; 3]]) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let pixels: Vec<_> = pixels.iter().map(|&p| image::Rgb(p)).collect();
+        image::codecs::hdr::HdrEncoder::new(&mut bytes).encode(&pixels, width, height).expect("memory has room");
+        bytes
+    }
+
+    fn exr(pixels: [[f32; 4]; 2]) -> Vec<u8> {
+        let mut bytes = Cursor::new(Vec::new());
+        let channels = SpecificChannels::build()
+            .with_channel("R")
+            .with_channel("G")
+            .with_channel("B")
+            .with_channel("depth")
+            .with_pixel_fn(|at| {
+                let [r, g, b, depth] = pixels[at.x()];
+                (r, g, b, depth)
+            });
+        Image::from_channels((2, 1), channels).write().to_buffered(&mut bytes).expect("memory has room");
+        bytes.into_inner()
+    }
+
+    #[test]
+    fn radiance_files_keep_their_values() {
+        let pixels = [[1.0, 0.5, 0.25], [1024.0, 0.0, 4.0]];
+        let loaded = decode(FILE.as_ref(), &hdr(2, 1, &pixels)).expect("it is a valid file");
+        assert_eq!((loaded.image.width, loaded.image.height, loaded.repaired_texels), (2, 1, 0));
+        // Radiance has 8 bits of mantissa, shared by the channels.
+        for (found, expected) in loaded.image.pixels.iter().zip(pixels) {
+            let tolerance = expected[0] / 128.0;
+            assert!(found.iter().zip(expected).all(|(f, e)| (f - e).abs() <= tolerance), "{found:?} {expected:?}");
+        }
+    }
+
+    #[test]
+    fn openexr_files_with_more_channels_load_and_bad_texels_become_black() {
+        let bytes = exr([[0.1, 1e6, 3.0, 7.0], [f32::NAN, -1.0, 2.0, 7.0]]);
+        let loaded = decode(FILE.as_ref(), &bytes).expect("it is a valid file");
+        assert_eq!(loaded.image.pixels, [[0.1, 1e6, 3.0], [0.0, 0.0, 2.0]]);
+        assert_eq!(loaded.repaired_texels, 1);
+        let other = decode(FILE.as_ref(), &exr([[0.1, 1e6, 3.0, 7.0], [0.0, 0.0, 2.5, 7.0]])).expect("valid");
+        assert_ne!(loaded.image.hash, other.image.hash);
+    }
+
+    #[test]
+    fn broken_files_give_one_line_that_names_them() {
+        let missing = load("no/such sky.hdr".as_ref()).expect_err("there is no such file").to_string();
+        assert!(missing.starts_with("no/such sky.hdr: cannot be read: "), "{missing}");
+        let whole = exr([[1.0; 4]; 2]);
+        let hdr = hdr(64, 64, &[[1.0, 2.0, 3.0]; 64 * 64]);
+        let absurd = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2000000000 +X 2000000000\n".as_slice();
+        for (bytes, expected) in [
+            (b"".as_slice(), "does not decode"),
+            (b"not an image", "does not decode"),
+            (&whole[..whole.len() / 2], "does not decode"),
+            (&hdr[..hdr.len() / 2], "does not decode"),
+            (absurd, "2000000000x2000000000 pixels are not within"),
+        ] {
+            let message = decode(FILE.as_ref(), bytes).expect_err("it is broken").to_string();
+            assert!(message.starts_with("sky: ") && message.contains(expected), "{message}");
+            assert!(!message.contains('\n'), "{message}");
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! glTF 2.0 import: a `.glb` or `.gltf` file becomes an immutable [`Scene`] and a report of what was met.
 //!
 //! # What becomes of what
-//! - Every (node, primitive) with triangles is one [`Instance`]; primitives that share their data share one [`Mesh`],
+//! - Every (node, primitive) with triangles is one [`Instance`](crate::scene::Instance); primitives that share their data share one [`Mesh`],
 //!   also across glTF meshes. Materials and textures that the chosen scene does not use are not loaded.
 //! - Node transforms are composed in f64. When the scene's centre is farther from the file's origin than
 //!   [`REBASE_RATIO`] times its diagonal, that centre becomes [`Scene::origin_in_file`] and all is stored relative to it;
@@ -12,6 +12,7 @@
 //! - Skins and morph targets are baked at the file's own pose or at [`ImportOptions::time_secs`].
 //! - Missing normals become flat ones; missing tangents are made by MikkTSpace where a material needs them.
 //! - A missing or undecodable image becomes one neutral texel (black for emission, flat for normals, else white).
+//! - Lights fall off by the inverse square alone: their `range`, a hint for rasterisers, is not used.
 //! - Without any light, a neutral sky lights the scene and the report says so.
 
 use std::collections::BTreeMap;
@@ -32,6 +33,7 @@ mod error;
 mod graph;
 mod json;
 mod material;
+mod meshopt;
 mod pose;
 mod primitive;
 mod report;

@@ -4,7 +4,7 @@
 mod import_support;
 
 use glam::Vec3;
-use import_support::{File, Random, floats, one_line_error, png};
+use import_support::{File, floats, one_line_error, png};
 use serde_json::json;
 use tracer::import::{ImportError, ImportOptions, ImportWarning, load_glb_bytes, load_gltf};
 use tracer::scene::Environment;
@@ -278,6 +278,22 @@ fn repairs_are_counted() {
         ImportWarning::SingularTransform { place: "node 1 'flat'".to_owned() },
     ] {
         assert!(report.warnings.contains(&expected), "{expected} in {:?}", report.warnings);
+    }
+}
+
+/// A xorshift generator: fixed seeds, no dependency.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0.wrapping_mul(0x2545_F491_4F6C_DD1D)
+    }
+
+    fn below(&mut self, bound: usize) -> usize {
+        ((self.next() >> 33) as usize) % bound.max(1)
     }
 }
 

@@ -4,9 +4,12 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use rayon::prelude::*;
+
 use super::container::Folder;
 use super::document::{Accessor, Component, Document, Sparse, View};
 use super::error::{ContentError, Fault};
+use super::meshopt;
 
 /// Most elements of an accessor that is not backed by as many bytes (no buffer view: zeros).
 const MAX_UNBACKED_ELEMENTS: usize = 1 << 24;
@@ -30,6 +33,7 @@ impl<'a> Data<'a> {
         let mut buffers: Vec<Option<Cow<'a, [u8]>>> = Vec::with_capacity(document.buffers.len());
         for (index, buffer) in document.buffers.iter().enumerate() {
             let bytes = match buffer.uri {
+                _ if buffer.is_fallback => None,
                 Some(uri) => {
                     let place = if uri.starts_with("data:") {
                         buffer.place.clone()
@@ -41,7 +45,6 @@ impl<'a> Data<'a> {
                     Some(Cow::Owned(bytes))
                 }
                 None if index == 0 => bin.map(Cow::Borrowed),
-                // The placeholder that meshopt compression leaves for readers that do not know it.
                 None => None,
             };
             if let Some(bytes) = bytes.as_ref().filter(|bytes| (bytes.len() as u64) < buffer.length) {
@@ -52,7 +55,9 @@ impl<'a> Data<'a> {
             }
             buffers.push(bytes);
         }
-        Ok(Self { document, buffers, decoded_views: BTreeMap::new() })
+        let mut data = Self { document, buffers, decoded_views: BTreeMap::new() };
+        data.decoded_views = data.decompress_views()?;
+        Ok(data)
     }
 
     /// The bytes of a buffer view.
@@ -64,12 +69,22 @@ impl<'a> Data<'a> {
         self.buffer_range(view, view.buffer, view.offset, view.length)
     }
 
-    fn buffer_range(&self, view: &View<'_>, buffer: usize, offset: u64, length: u64) -> Result<&[u8], Fault> {
+    fn decompress_views(&self) -> Result<BTreeMap<usize, Vec<u8>>, Fault> {
+        let compressed = self.document.views.par_iter().enumerate().filter_map(|(index, view)| {
+            let compressed = view.compressed.as_ref()?;
+            let decoded = self.buffer_range(view, compressed.buffer, compressed.offset, compressed.length);
+            let decoded = decoded.and_then(|bytes| {
+                let fault = |problem| Fault::new(view.place.clone(), ContentError::Compressed(problem));
+                meshopt::decode(compressed, bytes).map_err(fault)
+            });
+            Some(decoded.map(|bytes| (index, bytes)))
+        });
+        compressed.collect()
+    }
+
+    fn buffer_range(&self, view: &View, buffer: usize, offset: u64, length: u64) -> Result<&[u8], Fault> {
         let Some(bytes) = &self.buffers[buffer] else {
-            let cause = match view.meshopt {
-                Some((name, _)) => ContentError::DataNeedsExtension(name.to_owned()),
-                None => ContentError::Unreadable("it has neither a URI nor a binary chunk".to_owned()),
-            };
+            let cause = ContentError::Unreadable("it has neither a URI nor a binary chunk".to_owned());
             return Err(Fault::new(self.document.buffers[buffer].place.clone(), cause));
         };
         slice(bytes, offset, length, &view.place, || format!("buffer {buffer}"))

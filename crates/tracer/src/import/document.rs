@@ -5,15 +5,22 @@
 
 use std::collections::BTreeMap;
 
-use glam::{DAffine3, DMat4, DQuat, DVec3};
 use serde_json::Value;
 
 use super::error::{ContentError, Fault};
 use super::json::Object;
 
+mod node;
+mod storage;
+
+use node::NodeLimits;
+pub(super) use node::{Animation, Channel, ChannelPath, Interpolation, Local, Node, unit_or_identity};
+pub(super) use storage::{Accessor, Buffer, Component, Compressed, CompressedMode, Filter, Sparse, View};
+
 /// Extensions that take effect here (or need none to be right), and may therefore be required.
 pub(super) const SUPPORTED_EXTENSIONS: &[&str] = &[
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
     "EXT_texture_webp",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
@@ -31,6 +38,7 @@ pub(super) const SUPPORTED_EXTENSIONS: &[&str] = &[
     "KHR_materials_variants",
     "KHR_materials_volume",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
     "KHR_node_visibility",
     "KHR_texture_transform",
 ];
@@ -42,7 +50,7 @@ pub(super) struct Document<'a> {
     pub(super) extensions_used: Vec<String>,
     pub(super) generator: Option<String>,
     pub(super) buffers: Vec<Buffer<'a>>,
-    pub(super) views: Vec<View<'a>>,
+    pub(super) views: Vec<View>,
     pub(super) accessors: Vec<Accessor>,
     pub(super) images: Vec<Image<'a>>,
     pub(super) samplers: Vec<Sampler>,
@@ -57,76 +65,6 @@ pub(super) struct Document<'a> {
     pub(super) scenes: Vec<Scene>,
     pub(super) default_scene: Option<usize>,
     pub(super) variants: Vec<String>,
-}
-
-pub(super) struct Buffer<'a> {
-    pub(super) place: String,
-    pub(super) uri: Option<&'a str>,
-    pub(super) length: u64,
-}
-
-pub(super) struct View<'a> {
-    pub(super) place: String,
-    pub(super) buffer: usize,
-    pub(super) offset: u64,
-    pub(super) length: u64,
-    pub(super) stride: Option<usize>,
-    /// EXT_ or KHR_meshopt_compression.
-    pub(super) meshopt: Option<(&'static str, Object<'a>)>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Component {
-    I8,
-    U8,
-    I16,
-    U16,
-    U32,
-    F32,
-}
-
-impl Component {
-    pub(super) fn from_code(code: u64) -> Option<Self> {
-        Some(match code {
-            5120 => Self::I8,
-            5121 => Self::U8,
-            5122 => Self::I16,
-            5123 => Self::U16,
-            5125 => Self::U32,
-            5126 => Self::F32,
-            _ => return None,
-        })
-    }
-
-    pub(super) fn bytes(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::U32 | Self::F32 => 4,
-        }
-    }
-}
-
-pub(super) struct Accessor {
-    pub(super) place: String,
-    pub(super) view: Option<usize>,
-    pub(super) offset: u64,
-    pub(super) component: Component,
-    /// Components per element: 1 to 4, or 4, 9, 16 for matrices.
-    pub(super) width: usize,
-    pub(super) is_matrix: bool,
-    pub(super) normalized: bool,
-    pub(super) count: usize,
-    pub(super) sparse: Option<Sparse>,
-}
-
-pub(super) struct Sparse {
-    pub(super) count: usize,
-    pub(super) index_view: usize,
-    pub(super) index_offset: u64,
-    pub(super) index_component: Component,
-    pub(super) value_view: usize,
-    pub(super) value_offset: u64,
 }
 
 pub(super) struct Image<'a> {
@@ -169,75 +107,10 @@ pub(super) struct Primitive {
     pub(super) draco: bool,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Local {
-    Matrix(DAffine3),
-    Trs { translation: DVec3, rotation: DQuat, scale: DVec3 },
-}
-
-impl Local {
-    pub(super) fn affine(self) -> DAffine3 {
-        match self {
-            Self::Matrix(matrix) => matrix,
-            Self::Trs { translation, rotation, scale } => {
-                DAffine3::from_scale_rotation_translation(scale, unit_or_identity(rotation), translation)
-            }
-        }
-    }
-}
-
-pub(super) fn unit_or_identity(q: DQuat) -> DQuat {
-    let length = q.length();
-    if length.is_finite() && length > 0.0 { q / length } else { DQuat::IDENTITY }
-}
-
-pub(super) struct Node {
-    pub(super) place: String,
-    pub(super) name: String,
-    pub(super) local: Local,
-    pub(super) children: Vec<usize>,
-    pub(super) mesh: Option<usize>,
-    pub(super) skin: Option<usize>,
-    pub(super) camera: Option<usize>,
-    pub(super) light: Option<usize>,
-    pub(super) weights: Option<Vec<f32>>,
-    pub(super) visible: bool,
-    /// Accessors of EXT_mesh_gpu_instancing by attribute name.
-    pub(super) instancing: Option<BTreeMap<String, usize>>,
-}
-
 pub(super) struct Skin {
     pub(super) place: String,
     pub(super) joints: Vec<usize>,
     pub(super) inverse_bind: Option<usize>,
-}
-
-pub(super) struct Animation {
-    pub(super) channels: Vec<Channel>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(super) enum ChannelPath {
-    Translation,
-    Rotation,
-    Scale,
-    Weights,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Interpolation {
-    Linear,
-    Step,
-    CubicSpline,
-}
-
-pub(super) struct Channel {
-    pub(super) place: String,
-    pub(super) node: usize,
-    pub(super) path: ChannelPath,
-    pub(super) interpolation: Interpolation,
-    pub(super) input: usize,
-    pub(super) output: usize,
 }
 
 pub(super) struct Scene {
@@ -259,9 +132,7 @@ impl<'a> Document<'a> {
             return Err(top.fault(ContentError::RequiredExtension(super::error::one_line(&name))));
         }
 
-        let buffers = parse_all(&root, "buffers", "buffer", |o| {
-            Ok(Buffer { uri: o.string("uri")?, length: o.required_uint("byteLength")?, place: o.place })
-        })?;
+        let buffers = parse_all(&root, "buffers", "buffer", Buffer::parse)?;
         let views = parse_all(&root, "bufferViews", "buffer view", |o| View::parse(o, buffers.len()))?;
         let accessors = parse_all(&root, "accessors", "accessor", |o| Accessor::parse(&o, views.len()))?;
         let images = parse_all(&root, "images", "image", |o| {
@@ -341,72 +212,6 @@ fn parse_all<'a, T>(
     parse: impl FnMut(Object<'a>) -> Result<T, Fault>,
 ) -> Result<Vec<T>, Fault> {
     root.objects(key, kind)?.into_iter().map(parse).collect()
-}
-
-impl<'a> View<'a> {
-    fn parse(o: Object<'a>, buffers: usize) -> Result<Self, Fault> {
-        let mut meshopt = None;
-        for name in ["KHR_meshopt_compression", "EXT_meshopt_compression"] {
-            if let Some(extension) = o.extension(name)? {
-                extension.required_index("buffer", "buffer", buffers)?;
-                meshopt = Some((name, extension));
-            }
-        }
-        Ok(Self {
-            buffer: o.required_index("buffer", "buffer", buffers)?,
-            offset: o.uint("byteOffset")?.unwrap_or(0),
-            length: o.required_uint("byteLength")?,
-            stride: Some(o.size_or("byteStride", 0)?).filter(|&stride| stride > 0),
-            meshopt,
-            place: o.place,
-        })
-    }
-}
-
-impl Accessor {
-    fn parse(o: &Object<'_>, views: usize) -> Result<Self, Fault> {
-        let component = |o: &Object<'_>| {
-            let code = o.required_uint("componentType")?;
-            Component::from_code(code).ok_or_else(|| o.bad("componentType", format!("is {code}, which is not known")))
-        };
-        let (width, is_matrix) = match o.string("type")?.unwrap_or_default() {
-            "SCALAR" => (1, false),
-            "VEC2" => (2, false),
-            "VEC3" => (3, false),
-            "VEC4" => (4, false),
-            "MAT2" => (4, true),
-            "MAT3" => (9, true),
-            "MAT4" => (16, true),
-            other => return Err(o.bad("type", format!("is '{}', which is not known", super::error::one_line(other)))),
-        };
-        let sparse = match o.object("sparse")? {
-            None => None,
-            Some(sparse) => {
-                let part = |key| sparse.object(key)?.ok_or_else(|| sparse.bad(key, "is missing"));
-                let (indices, values) = (part("indices")?, part("values")?);
-                Some(Sparse {
-                    count: sparse.size_or("count", 0)?,
-                    index_view: indices.required_index("bufferView", "buffer view", views)?,
-                    index_offset: indices.uint("byteOffset")?.unwrap_or(0),
-                    index_component: component(&indices)?,
-                    value_view: values.required_index("bufferView", "buffer view", views)?,
-                    value_offset: values.uint("byteOffset")?.unwrap_or(0),
-                })
-            }
-        };
-        let count = o.required_uint("count")?;
-        Ok(Self {
-            view: o.index("bufferView", "buffer view", views)?,
-            offset: o.uint("byteOffset")?.unwrap_or(0),
-            component: component(o)?,
-            width,
-            is_matrix,
-            normalized: o.bool_or("normalized", false)?,
-            count: usize::try_from(count).map_err(|_| o.bad("count", "is too large"))?,
-            sparse,
-            place: o.place.clone(),
-        })
-    }
 }
 
 impl Sampler {
@@ -500,84 +305,4 @@ fn attribute_map(o: &Object<'_>, accessors: usize) -> Result<BTreeMap<String, us
         .filter(|key| key.bytes().all(|b| b.is_ascii_uppercase() || b.is_ascii_digit() || b == b'_'))
         .map(entry)
         .collect()
-}
-
-struct NodeLimits {
-    nodes: usize,
-    meshes: usize,
-    skins: usize,
-    cameras: usize,
-    lights: usize,
-    accessors: usize,
-}
-
-impl Node {
-    fn parse(o: Object<'_>, limits: &NodeLimits) -> Result<Self, Fault> {
-        let local = if let Some(matrix) = o.numbers::<16>("matrix")? {
-            Local::Matrix(DAffine3::from_mat4(DMat4::from_cols_array(&matrix)))
-        } else {
-            Local::Trs {
-                translation: o.numbers("translation")?.map_or(DVec3::ZERO, DVec3::from_array),
-                rotation: o.numbers("rotation")?.map_or(DQuat::IDENTITY, DQuat::from_array),
-                scale: o.numbers("scale")?.map_or(DVec3::ONE, DVec3::from_array),
-            }
-        };
-        let instancing = match o.extension("EXT_mesh_gpu_instancing")? {
-            Some(extension) => {
-                extension.object("attributes")?.map(|a| attribute_map(&a, limits.accessors)).transpose()?
-            }
-            None => None,
-        };
-        Ok(Self {
-            name: o.name().to_owned(),
-            local,
-            children: o.indices("children", "node", limits.nodes)?,
-            mesh: o.index("mesh", "mesh", limits.meshes)?,
-            skin: o.index("skin", "skin", limits.skins)?,
-            camera: o.index("camera", "camera", limits.cameras)?,
-            light: match o.extension("KHR_lights_punctual")? {
-                Some(extension) => extension.index("light", "light", limits.lights)?,
-                None => None,
-            },
-            weights: weights(&o)?,
-            visible: o.extension("KHR_node_visibility")?.map_or(Ok(true), |e| e.bool_or("visible", true))?,
-            instancing,
-            place: o.place,
-        })
-    }
-}
-
-impl Animation {
-    fn parse(o: &Object<'_>, nodes: usize, accessors: usize) -> Result<Self, Fault> {
-        let samplers = o.objects("samplers", "sampler")?;
-        let mut channels = Vec::new();
-        for channel in o.objects("channels", "channel")? {
-            let sampler = &samplers[channel.required_index("sampler", "sampler", samplers.len())?];
-            let target = channel.object("target")?.ok_or_else(|| channel.bad("target", "is missing"))?;
-            let path = match target.string("path")? {
-                Some("translation") => ChannelPath::Translation,
-                Some("rotation") => ChannelPath::Rotation,
-                Some("scale") => ChannelPath::Scale,
-                Some("weights") => ChannelPath::Weights,
-                // "pointer" belongs to KHR_animation_pointer, which the report names as ignored.
-                _ => continue,
-            };
-            let Some(node) = target.index("node", "node", nodes)? else { continue };
-            let interpolation = match sampler.string("interpolation")? {
-                None | Some("LINEAR") => Interpolation::Linear,
-                Some("STEP") => Interpolation::Step,
-                Some("CUBICSPLINE") => Interpolation::CubicSpline,
-                Some(_) => return Err(sampler.bad("interpolation", "is not known")),
-            };
-            channels.push(Channel {
-                node,
-                path,
-                interpolation,
-                input: sampler.required_index("input", "accessor", accessors)?,
-                output: sampler.required_index("output", "accessor", accessors)?,
-                place: channel.place,
-            });
-        }
-        Ok(Self { channels })
-    }
 }

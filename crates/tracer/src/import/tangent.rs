@@ -135,4 +135,40 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn odd_geometry_gets_unit_tangents() {
+        let mut state = 0x9E37_79B9_7F4A_7C15u64;
+        let mut next = move || {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            state >> 33
+        };
+        const ODD: [f32; 8] = [0.0, 1.0, -1.0, 1e-30, 1e30, -3e38, 0.5, 1e-45];
+        for round in 0..200 {
+            let count = 4 + (next() % 30) as usize;
+            let mut value = |odd: bool| {
+                let pick = next();
+                if odd { ODD[pick as usize % 8] } else { (pick % 1000) as f32 / 500.0 - 1.0 }
+            };
+            let (odd_positions, odd_uvs) = (round % 2 == 1, round % 4 >= 2);
+            let mut vertices = Vertices::default();
+            for _ in 0..count {
+                vertices.positions.push(Vec3::from_array(std::array::from_fn(|_| value(odd_positions))));
+                vertices.uvs[0].push(Vec2::from_array(std::array::from_fn(|_| value(odd_uvs))));
+                vertices.normals.push(Vec3::new(value(false), value(false), 1.5).normalize());
+            }
+            let mut triangles: Vec<[u32; 3]> =
+                (0..60).map(|_| std::array::from_fn(|_| next() as u32 % count as u32)).collect();
+            generate(&mut vertices, &mut triangles, 0);
+            assert_eq!(vertices.tangents.len(), vertices.positions.len());
+            for tangent in &vertices.tangents {
+                assert!(
+                    (tangent.truncate().length() - 1.0).abs() < 1e-4 && tangent.w.abs() == 1.0,
+                    "{round}: {tangent}"
+                );
+            }
+        }
+    }
 }

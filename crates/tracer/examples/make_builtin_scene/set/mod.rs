@@ -31,7 +31,7 @@ pub(crate) fn glb() -> Vec<u8> {
     corners::build(&mut scene, &palette);
     let eye = Vec3::new(0.0, 1.6, 0.0);
     scene.camera("Centre", eye, eye - Vec3::Z, 1.05);
-    scene.camera("Still life", Vec3::new(-0.55, 1.25, -1.15), Vec3::new(0.08, 0.92, -2.5), 0.8);
+    scene.camera("Still life", Vec3::new(-0.5, 1.22, -0.75), Vec3::new(0.1, 0.9, -2.0), 0.8);
     scene.camera("Window", Vec3::new(-1.2, 1.5, 0.6), Vec3::new(3.5, 1.35, -0.2), 0.9);
     scene.camera("Bookshelf", Vec3::new(0.5, 1.45, 0.9), Vec3::new(-0.2, 1.25, 3.6), 0.9);
     scene.camera("Metal row", Vec3::new(-1.5, 1.35, -0.9), Vec3::new(-3.3, 1.15, 0.25), 0.8);

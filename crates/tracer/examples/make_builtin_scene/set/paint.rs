@@ -123,13 +123,13 @@ pub(super) fn landscape() -> Picture {
             |base: f32, swing: f32, cell: u32, seed: u32| base + swing * (noise(x, 0, [cell, 1], [W, 1], seed) - 0.5);
         let row = y as f32 / H as f32;
         if row > ridge(0.86, 0.10, 64, 43) {
-            return [70, 96, 58];
+            return [26, 40, 18];
         }
         if row > ridge(0.74, 0.18, 64, 42) {
-            return [104, 128, 104];
+            return [52, 70, 50];
         }
         if row > ridge(0.64, 0.20, 32, 41) {
-            return [150, 170, 182];
+            return [92, 112, 126];
         }
         let p = [W, H];
         let cloud = noise(x, y, [64, 16], p, 44) * 0.6 + noise(x, y, [16, 8], p, 45) * 0.4;

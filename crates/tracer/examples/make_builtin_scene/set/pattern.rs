@@ -107,10 +107,10 @@ pub(super) fn eye_chart() -> Picture {
     // Pixel size of a letter's dot by row; a letter is 5 x 7 dots and takes 8 x 7.
     const DOTS: [u32; 11] = [40, 30, 22, 16, 12, 9, 7, 5, 4, 3, 2];
     let mut rows = Vec::new();
-    let mut top = 60;
+    let mut top = 36;
     for (row, dot) in DOTS.into_iter().enumerate() {
         rows.push((row as u32, dot, top));
-        top += dot * 7 + 34 + dot * 2;
+        top += dot * 8 + 14;
     }
     Picture::grey(W, H, move |x, y| {
         if x < 8 || y < 8 || x >= W - 8 || y >= H - 8 {
