@@ -107,8 +107,14 @@ fn warps() -> Vec<(String, GazeWarp)> {
             }
         }
         let distribution = RadialDistribution::new(Reddy2001, geometry, cap, 0.002).unwrap();
-        for form in [Form::Eq6, Form::SquaredPolynomial(7), Form::Polynomial(7), Form::Rational(4, 3), Form::Table(256)]
-        {
+        for form in [
+            Form::Eq6,
+            Form::SquaredPolynomial(7),
+            Form::Polynomial(7),
+            Form::Rational(4, 3),
+            Form::Piecewise(3, 5),
+            Form::Table(64),
+        ] {
             if let Ok(inverse) = Inverse::with_form(&distribution, form) {
                 all.push((format!("reddy {geometry:?}"), GazeWarp::with_inverse(distribution.clone(), inverse)));
             }
