@@ -15,8 +15,6 @@ pub struct MaxRelativeError(pub f64);
 /// The part beyond the cap: `v = 2 - (1 - u) slope` for `u > start`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Tail {
-    /// `1 + kappa`: within the cap `U = u scale`.
-    pub(crate) scale: f32,
     /// The `u` at the cap, `1 / (1 + kappa)`.
     pub(crate) joint: f64,
     /// The largest f32 that is at most `joint`.
@@ -28,8 +26,9 @@ pub(crate) struct Tail {
 /// [`crate::wgsl::radial_module`] prescribes.
 ///
 /// # Definition
-/// A few pieces in `U = u (1 + kappa)`: a disc about the gaze, where the density is flat; a polynomial, rational or table;
-/// a ring of flat density where the model has one; and, with a floor, the cap's complement. The pieces meet: the flat pieces'
+/// A few pieces: a disc about the gaze, where the density is flat; a polynomial, rational or table; a ring of flat density
+/// where the model has one; and, with a floor, the cap's complement. A floor needs no new fit: within the cap the fit's
+/// argument is `u (1 + kappa)`, a factor that is folded into the coefficients. The pieces meet: the flat pieces'
 /// coefficients are taken from the fitted piece's value at the joint, which costs no accuracy, so that the map is a
 /// bijection ([`Inverse::eq6`], kept as printed, leaves a gap).
 ///
@@ -108,6 +107,7 @@ impl Inverse {
     }
 
     /// The radius at `u`: `v = 1 - cos e` in `[0, 2]` on the sphere, `e` in radians on the plane.
+    #[inline]
     #[must_use]
     pub fn eval(&self, u: f32) -> f32 {
         let u = unit_interval(u);
@@ -119,6 +119,7 @@ impl Inverse {
     }
 
     /// `v = 1 - cos e` in `[0, 2]` at `u`, in both geometries: the shader's `warp_radius`.
+    #[inline]
     #[must_use]
     pub fn eval_versine(&self, u: f32) -> f32 {
         let u = unit_interval(u);
@@ -136,9 +137,8 @@ impl Inverse {
 
     #[inline]
     fn eval_capped(&self, u: f32) -> f32 {
-        let capped_u = self.tail.map_or(u, |tail| u * tail.scale);
         let (last, others) = self.pieces.split_last().expect("an inverse has at least one piece");
-        others.iter().find(|piece| capped_u <= piece.end).unwrap_or(last).eval(capped_u)
+        others.iter().find(|piece| u <= piece.end).unwrap_or(last).eval(u)
     }
 
     /// The radius and its derivative by `u` in f64, with the f32 coefficients: the map that the shader computes but for its
@@ -156,12 +156,8 @@ impl Inverse {
                 Geometry::Plane => (Angle::from_versine(v).radians(), slope / (v * (2.0 - v)).max(1e-30).sqrt()),
             };
         }
-        let scale = self.tail.map_or(1.0, |tail| f64::from(tail.scale));
-        let capped_u = u * scale;
         let (last, others) = self.pieces.split_last().expect("an inverse has at least one piece");
-        let piece = others.iter().find(|piece| capped_u <= f64::from(piece.end)).unwrap_or(last);
-        let (x, slope) = piece.eval_f64(capped_u);
-        (x, slope * scale)
+        others.iter().find(|piece| u <= f64::from(piece.end)).unwrap_or(last).eval_f64(u)
     }
 
     /// The eccentricity at `u`, from the f32 evaluation.
@@ -232,7 +228,10 @@ pub enum Form {
     SquaredPolynomial(u8),
     /// A rational with these degrees of numerator and denominator (1 to 5).
     Rational(u8, u8),
-    /// A cubic Hermite table with this many cells, a power of two in `[4, 4096]`.
+    /// This many polynomials (2 to 8) of this degree (3 to 7), on pieces of equal error, that meet.
+    Piecewise(u8, u8),
+    /// A cubic Hermite table with this many cells, a power of two in `[4, 4096]`. As WGSL a constant array, which software
+    /// adapters compile slowly (64 cells are fine).
     Table(u16),
     /// Eq. 6 of Koskela et al. 2017 as printed; only for its own distribution, with any floor.
     Eq6,
@@ -246,6 +245,7 @@ impl Form {
             Self::Polynomial(degree) => format!("poly{degree}"),
             Self::SquaredPolynomial(degree) => format!("poly{degree}-squared"),
             Self::Rational(n, m) => format!("rational{n}/{m}"),
+            Self::Piecewise(pieces, degree) => format!("{pieces}xpoly{degree}"),
             Self::Table(cells) => format!("table{cells}"),
             Self::Eq6 => "eq6".into(),
         }

@@ -14,6 +14,7 @@ pub mod layers;
 pub mod model;
 mod quadrature;
 mod radial;
+pub mod report;
 pub mod sequence;
 pub mod special;
 pub mod trig;

@@ -83,6 +83,7 @@ impl GazeWarp {
     }
 
     /// The shader's arithmetic: the unit direction in the gaze's frame, as WGSL's `warp_local`.
+    #[inline]
     #[must_use]
     pub fn sample_local_f32(&self, u: [f32; 2]) -> [f32; 3] {
         let v = self.inverse.eval_versine(u[0]);
@@ -92,6 +93,7 @@ impl GazeWarp {
     }
 
     /// The shader's arithmetic: the direction in world space.
+    #[inline]
     #[must_use]
     pub fn sample_f32(&self, u: [f32; 2], gaze: [f32; 3]) -> [f32; 3] {
         let [x, y, z] = self.sample_local_f32(u);

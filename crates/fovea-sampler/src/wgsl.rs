@@ -44,7 +44,7 @@ pub fn radial_module(inverse: &Inverse) -> String {
             text,
             "// 1 - cos(e) for e in [0, pi].\nfn warp_versine(e: f32) -> f32 {{\n    let half = 0.5 * e;\n    \
              let half2 = half * half;\n    let sine = half * {};\n    return 2.0f * sine * sine;\n}}\n",
-            horner(&SIN_HALF, "half2")
+            parenthesised(horner(&SIN_HALF, "half2"))
         );
     }
     text.push_str(&warp_radius(inverse));
@@ -55,16 +55,14 @@ pub fn radial_module(inverse: &Inverse) -> String {
 
 fn warp_radius(inverse: &Inverse) -> String {
     let mut text = String::from("// 1 - cos of the eccentricity, in [0, 2].\nfn warp_radius(u: f32) -> f32 {\n");
-    let mut x = "u";
+    let x = "u";
     if let Some(tail) = inverse.tail() {
         let _ = writeln!(
             text,
-            "    if u > {} {{\n        return 2.0f - (1.0f - u) * {};\n    }}\n    let x = u * {};",
+            "    if u > {} {{\n        return 2.0f - (1.0f - u) * {};\n    }}",
             literal(tail.start),
-            literal(tail.slope),
-            literal(tail.scale)
+            literal(tail.slope)
         );
-        x = "x";
     }
     let plane = inverse.geometry() == Geometry::Plane;
     let last = inverse.pieces().len() - 1;
@@ -87,7 +85,7 @@ fn warp_radius(inverse: &Inverse) -> String {
     text
 }
 
-/// Statements and the expression of a piece's radius; `x` names `U`.
+/// Statements and the expression of a piece's radius; `x` names `u`.
 fn piece_text(piece: &Piece, index: usize, x: &str) -> (Vec<String>, String) {
     let mut statements = Vec::new();
     let t = match piece.argument {
@@ -97,6 +95,12 @@ fn piece_text(piece: &Piece, index: usize, x: &str) -> (Vec<String>, String) {
             "root".to_owned()
         }
     };
+    let t = if piece.origin == 0.0 {
+        t
+    } else {
+        statements.push(format!("let t = {t} - {};", literal(piece.origin)));
+        "t".to_owned()
+    };
     let core = match &piece.core {
         Core::Polynomial(coefficients) => horner(coefficients, &t),
         Core::Rational { numerator, denominator } => {
@@ -104,7 +108,7 @@ fn piece_text(piece: &Piece, index: usize, x: &str) -> (Vec<String>, String) {
         }
         Core::Table { per_unit, first, cells } => {
             let last = *first as usize + cells.len() - 1;
-            statements.push(format!("let position = {t} * {};", literal(*per_unit as f32)));
+            statements.push(format!("let position = {t} * {};", literal(*per_unit)));
             statements.push(format!("let cell = clamp(u32(position), {first}u, {last}u);"));
             statements.push("let at = position - f32(cell);".into());
             statements.push(format!("let c = WARP_CELLS_{index}[cell - {first}u];"));

@@ -18,17 +18,22 @@ fn candidates(geometry: Geometry) -> Vec<Form> {
         forms.extend((2..=8).map(Form::SquaredPolynomial));
     }
     forms.extend([(2, 2), (3, 2), (3, 3), (4, 3), (4, 4), (5, 4), (5, 5)].map(|(n, m)| Form::Rational(n, m)));
-    forms.extend((4..=12).map(|log2| Form::Table(1 << log2)));
+    let pieces = [(2, 4), (2, 5), (3, 5), (4, 5), (4, 6), (6, 6), (8, 6), (8, 7)];
+    forms.extend(pieces.map(|(pieces, degree)| Form::Piecewise(pieces, degree)));
     forms.sort_by_key(|form| estimated_cost(*form));
+    // Tables last, though cheaper than some: a large constant array burdens shader compilers.
+    forms.extend((6..=12).map(|log2| Form::Table(1 << log2)));
     forms
 }
 
-/// Additions and multiplications, a division counted as 6 and a table's look-up as 12 and more as it outgrows the caches.
+/// Additions and multiplications, a division counted as 6 and a table's look-up as 12 and more as it outgrows the caches, a
+/// comparison as 2.
 fn estimated_cost(form: Form) -> u32 {
     match form {
         Form::Polynomial(degree) => 2 * u32::from(degree),
         Form::SquaredPolynomial(degree) => 2 * u32::from(degree) + 1,
         Form::Rational(n, m) => 2 * (u32::from(n) + u32::from(m)) + 6,
+        Form::Piecewise(pieces, degree) => 2 * u32::from(degree) + 1 + 2 * u32::from(pieces),
         Form::Table(cells) => 18 + u32::from(cells).ilog2(),
         Form::Eq6 => 8,
     }
@@ -52,23 +57,26 @@ pub(super) fn fit(distribution: &RadialDistribution, accuracy: MaxRelativeError)
 /// The first candidate within `accuracy`, or else the best of all.
 fn search(distribution: &RadialDistribution, truth: &Truth, accuracy: f64) -> Result<Inverse, Box<Inverse>> {
     let mut best: Option<Inverse> = None;
-    for form in candidates(distribution.geometry()) {
-        let Some(fitted) = Fitted::new(distribution, truth, form) else { continue };
-        // What the exact-arithmetic fit misses, f32 will not find.
-        if fitted.error > accuracy && best.is_some() && !matches!(form, Form::Table(_)) {
-            continue;
-        }
-        let inverse = assemble(distribution, truth, form, fitted);
-        // Neither a map that falls somewhere nor one that lives on cancelling terms.
-        let too_rough = inverse.bound.rounding > 0.2 * accuracy + 5e-7;
-        if inverse.bound.relative_density.is_infinite() || (too_rough && best.is_some()) {
-            continue;
-        }
-        if inverse.bound.relative_e <= accuracy {
-            return Ok(inverse);
-        }
-        if best.as_ref().is_none_or(|best| inverse.bound.relative_e < best.bound.relative_e) {
-            best = Some(inverse);
+    // What an exact-arithmetic fit misses, f32 will not find: the first pass does not even measure it.
+    for skip_hopeless in [true, false] {
+        for form in candidates(distribution.geometry()) {
+            let Some(fitted) = Fitted::new(distribution, truth, form) else { continue };
+            if (fitted.error > accuracy) == skip_hopeless {
+                continue;
+            }
+            let inverse = assemble(distribution, truth, form, fitted);
+            // A map that falls somewhere is no inverse.
+            if inverse.bound.relative_density.is_infinite() {
+                continue;
+            }
+            // Nor should one live on cancelling terms.
+            let too_rough = inverse.bound.rounding > 0.2 * accuracy + 5e-7;
+            if inverse.bound.relative_e <= accuracy && !too_rough {
+                return Ok(inverse);
+            }
+            if best.as_ref().is_none_or(|best| inverse.bound.relative_e < best.bound.relative_e) {
+                best = Some(inverse);
+            }
         }
     }
     Err(Box::new(best.expect("a table exists for every distribution")))
@@ -79,6 +87,7 @@ pub(super) fn with_form(distribution: &RadialDistribution, form: Form) -> Result
         Form::Polynomial(degree) => (2..=8).contains(&degree),
         Form::SquaredPolynomial(degree) => (2..=8).contains(&degree) && distribution.geometry() == Geometry::Sphere,
         Form::Rational(n, m) => (1..=5).contains(&n) && (1..=5).contains(&m),
+        Form::Piecewise(pieces, degree) => (2..=8).contains(&pieces) && (3..=7).contains(&degree),
         Form::Table(cells) => (4..=4096).contains(&cells) && cells.is_power_of_two(),
         Form::Eq6 => return eq6(distribution),
     };
@@ -109,10 +118,11 @@ pub(super) fn eq6(distribution: &RadialDistribution) -> Result<Inverse, SamplerE
     let scale = Angle::from_degrees(80.0).radians();
     let scaled = |coefficients: &[f64]| Core::Polynomial(coefficients.iter().map(|c| (c * scale) as f32).collect());
     let pieces = vec![
-        Piece { end: 0.0965, argument: Argument::U, core: scaled(&[0.2330]), outer: Outer::TimesSqrtU },
+        Piece { end: 0.0965, argument: Argument::U, origin: 0.0, core: scaled(&[0.2330]), outer: Outer::TimesSqrtU },
         Piece {
             end: 1.0,
             argument: Argument::U,
+            origin: 0.0,
             core: scaled(&[0.0404, 0.2984, 0.3451, 0.0021, 0.3136]),
             outer: Outer::Identity,
         },
@@ -122,8 +132,8 @@ pub(super) fn eq6(distribution: &RadialDistribution) -> Result<Inverse, SamplerE
 
 /// The stretch between the flat centre and the flat rim, fitted.
 struct Fitted {
-    /// The fitted piece; `None` if the distribution is flat throughout.
-    piece: Option<Piece>,
+    /// The fitted pieces; none if the distribution is flat throughout.
+    pieces: Vec<Piece>,
     /// `U` at its ends.
     range: [f64; 2],
     /// Minimax error in exact arithmetic; 0 for tables, whose error is only measured.
@@ -133,26 +143,26 @@ struct Fitted {
 impl Fitted {
     fn new(distribution: &RadialDistribution, truth: &Truth, form: Form) -> Option<Self> {
         let stretches = distribution.stretches();
-        let first_curved = stretches.iter().position(|s| !s.flat);
-        // A flat stretch next to another (a disc and its floor) is a kink for the fit, so both count as curved but the first.
-        let (Some(first), Some(last)) = (
-            first_curved.or((stretches.len() > 2).then_some(1)),
-            stretches.iter().rposition(|s| !s.flat).or((stretches.len() > 2).then(|| stretches.len() - 2)),
-        ) else {
+        let count = stretches.len();
+        // Only the first flat stretch is the disc and only the last one the rim; the curve is what lies between.
+        let first = usize::from(stretches[0].flat);
+        let last = if stretches[count - 1].flat { count - 1 } else { count };
+        if first >= last {
             let joint = stretches[0].end;
-            return Some(Self { piece: None, range: [joint, joint], error: 0.0 });
-        };
-        // Several flat steps in front of the curved part belong to the fit too; only one can be the disc.
-        let first = first.min(1);
-        let last = last.max(stretches.len().saturating_sub(2)).max(first);
-        let last = if stretches[stretches.len() - 1].flat { last } else { stretches.len() - 1 };
-        let range = [stretches[first].start, stretches[last].end];
-        let central = first == 0;
-        let fitter = Fitter { distribution, truth, range, central };
-        let (core, outer, error) = fitter.fit(form)?;
-        let argument = if central { Argument::SqrtU } else { Argument::U };
-        let piece = Piece { end: range[1] as f32, argument, core, outer };
-        Some(Self { piece: Some(piece), range, error })
+            return Some(Self { pieces: Vec::new(), range: [joint, joint], error: 0.0 });
+        }
+        let range = [stretches[first].start, stretches[last - 1].end];
+        let kinks = stretches[first..last - 1].iter().map(|s| s.end).collect();
+        let fitter = Fitter { distribution, truth, range, kinks, central: first == 0 };
+        let (pieces, error) = fitter.fit(form)?;
+        Some(Self { pieces, range, error })
+    }
+
+    /// The radius at `U`, in f64.
+    fn value(&self, capped_u: f64) -> Option<f64> {
+        let (last, others) = self.pieces.split_last()?;
+        let piece = others.iter().find(|piece| capped_u <= f64::from(piece.end)).unwrap_or(last);
+        Some(piece.eval_f64(capped_u).0)
     }
 }
 
@@ -160,39 +170,121 @@ struct Fitter<'a> {
     distribution: &'a RadialDistribution,
     truth: &'a Truth,
     range: [f64; 2],
+    /// `U` where two smooth stretches meet inside the range.
+    kinks: Vec<f64>,
     /// Whether the fit begins at the gaze: then in `s = sqrt(U)`, of `v / U` or `e / s`.
     central: bool,
 }
 
 impl Fitter<'_> {
-    fn fit(&self, form: Form) -> Option<(Core, Outer, f64)> {
+    fn fit(&self, form: Form) -> Option<(Vec<Piece>, f64)> {
+        let whole = self.argument_range();
+        let polynomial = |fit: &Minimax| Core::Polynomial(rounded(&fit.numerator));
+        let one = |core: Core, error: f64| (vec![self.piece(core, whole[1], 0.0)], error);
+        match form {
+            Form::Polynomial(degree) => {
+                let fit = minimax(&self.problem(whole, 0.0, false), degree.into(), 0)?;
+                Some(one(polynomial(&fit), fit.error))
+            }
+            // At the gaze the square would lose the relative accuracy that the factor U gives.
+            Form::SquaredPolynomial(_) if self.central => None,
+            Form::SquaredPolynomial(degree) => {
+                let fit = minimax(&self.problem(whole, 0.0, true), degree.into(), 0)?;
+                let mut piece = self.piece(polynomial(&fit), whole[1], 0.0);
+                piece.outer = Outer::Square;
+                Some((vec![piece], fit.error))
+            }
+            Form::Rational(n, m) => {
+                let fit = minimax(&self.problem(whole, 0.0, false), n.into(), m.into())?;
+                let core =
+                    Core::Rational { numerator: rounded(&fit.numerator), denominator: rounded(&fit.denominator) };
+                Some(one(core, fit.error))
+            }
+            Form::Piecewise(pieces, degree) => self.piecewise(pieces.into(), degree.into()),
+            Form::Table(cells) => Some(one(self.table(u32::from(cells)), 0.0)),
+            Form::Eq6 => None,
+        }
+    }
+
+    /// A piece of the curve that ends at argument `end`.
+    fn piece(&self, core: Core, end: f64, origin: f32) -> Piece {
         let outer = match (self.central, self.distribution.geometry()) {
             (true, Geometry::Sphere) => Outer::TimesU,
             (true, Geometry::Plane) => Outer::TimesSqrtU,
             (false, _) => Outer::Identity,
         };
-        let rounded = |c: &[f64]| c.iter().map(|x| *x as f32).collect::<Vec<f32>>();
-        let polynomial = |fit: &Minimax| Core::Polynomial(rounded(&fit.numerator));
-        match form {
-            Form::Polynomial(degree) => {
-                let fit = minimax(&self.problem(false), degree.into(), 0)?;
-                Some((polynomial(&fit), outer, fit.error))
-            }
-            // At the gaze the square would lose the relative accuracy that the factor U gives.
-            Form::SquaredPolynomial(_) if self.central => None,
-            Form::SquaredPolynomial(degree) => {
-                let fit = minimax(&self.problem(true), degree.into(), 0)?;
-                Some((polynomial(&fit), Outer::Square, fit.error))
-            }
-            Form::Rational(n, m) => {
-                let fit = minimax(&self.problem(false), n.into(), m.into())?;
-                let core =
-                    Core::Rational { numerator: rounded(&fit.numerator), denominator: rounded(&fit.denominator) };
-                Some((core, outer, fit.error))
-            }
-            Form::Table(cells) => Some((self.table(u32::from(cells)), outer, 0.0)),
-            Form::Eq6 => None,
+        let (argument, end) = if self.central { (Argument::SqrtU, end * end) } else { (Argument::U, end) };
+        Piece { end: end as f32, argument, origin, core, outer }
+    }
+
+    /// Polynomials on pieces whose ends are moved until their errors are alike. `None` if the curve has more kinks than pieces.
+    fn piecewise(&self, count: usize, degree: usize) -> Option<(Vec<Piece>, f64)> {
+        let [lo, hi] = self.argument_range();
+        let kinks: Vec<f64> = self.kinks.iter().map(|u| if self.central { u.sqrt() } else { *u }).collect();
+        let smooth: Vec<f64> = core::iter::once(lo).chain(kinks).chain([hi]).collect();
+        if smooth.len() - 1 > count {
+            return None;
         }
+        // The longest smooth stretches are cut until there are enough.
+        let mut cuts: Vec<usize> = vec![1; smooth.len() - 1];
+        while cuts.iter().sum::<usize>() < count {
+            let length = |i: usize| (smooth[i + 1] - smooth[i]) / cuts[i] as f64;
+            let longest = (0..cuts.len()).max_by(|a, b| length(*a).total_cmp(&length(*b)))?;
+            cuts[longest] += 1;
+        }
+        let (mut pieces, mut worst) = (Vec::new(), 0.0_f64);
+        for (ends, cuts) in smooth.windows(2).zip(cuts) {
+            let (fits, edges) = self.balanced([ends[0], ends[1]], cuts, degree)?;
+            for (fit, edge) in fits.iter().zip(edges.windows(2)) {
+                // The correction to the exact values at the ends may double the error.
+                worst = worst.max(2.0 * fit.error);
+                pieces.push(self.joined(fit, [edge[0], edge[1]]));
+            }
+        }
+        Some((pieces, worst))
+    }
+
+    /// Fits on `count` pieces of a smooth stretch; their widths are corrected by how the error scales with the width.
+    fn balanced(&self, [lo, hi]: [f64; 2], count: usize, degree: usize) -> Option<(Vec<Minimax>, Vec<f64>)> {
+        const ROUNDS: usize = 5;
+        let mut widths = vec![(hi - lo) / count as f64; count];
+        for round in 1.. {
+            let mut edges = vec![lo];
+            for width in &widths[..count - 1] {
+                // Ends that f32 holds exactly, so that both sides are corrected at the same place.
+                edges.push(f64::from((edges[edges.len() - 1] + width) as f32));
+            }
+            edges.push(hi);
+            let fit = |i: usize| {
+                let range = [edges[i], edges[i + 1]];
+                minimax(&self.problem(range, middle(range), false), degree, 0)
+            };
+            let fits: Vec<Minimax> = (0..count).map(fit).collect::<Option<_>>()?;
+            if count == 1 || round == ROUNDS {
+                return Some((fits, edges));
+            }
+            let mean = fits.iter().map(|fit| fit.error.ln()).sum::<f64>() / count as f64;
+            let power = 1.0 / (degree as f64 + 1.0);
+            for (width, fit) in widths.iter_mut().zip(&fits) {
+                *width *= ((mean - fit.error.ln()) * power).exp().clamp(0.3, 3.0);
+            }
+            let total: f64 = widths.iter().sum();
+            widths.iter_mut().for_each(|width| *width *= (hi - lo) / total);
+        }
+        None
+    }
+
+    /// A fit with a straight line added that makes it exact at its ends, so that neighbours meet.
+    fn joined(&self, fit: &Minimax, range: [f64; 2]) -> Piece {
+        let origin = middle(range);
+        let value = |t: f64| fit.numerator.iter().rev().fold(0.0, |sum, c| sum * t + c);
+        let [a, b] = range.map(|t| t - f64::from(origin));
+        let [at_a, at_b] = [self.core_value(range[0]) - value(a), self.core_value(range[1]) - value(b)];
+        let slope = (at_b - at_a) / (b - a);
+        let mut coefficients = fit.numerator.clone();
+        coefficients[0] += at_a - slope * a;
+        coefficients[1] += slope;
+        self.piece(Core::Polynomial(rounded(&coefficients)), range[1], origin)
     }
 
     /// The core's argument at the ends.
@@ -205,10 +297,12 @@ impl Fitter<'_> {
         if self.central { self.truth.reduced(t) } else { self.truth.radial(t) }
     }
 
-    /// The fit in the measure of relative error in e: `d ln e = (v / (e sin e)) d ln v` on the sphere.
-    fn problem(&self, square_root: bool) -> Problem {
-        let [lo, hi] = self.argument_range();
-        Problem::new(lo, hi, |t| {
+    /// The fit on a range of the argument in the measure of relative error in e: `d ln e = (v / (e sin e)) d ln v` on the
+    /// sphere. The fit's variable is the argument less `origin`.
+    fn problem(&self, [lo, hi]: [f64; 2], origin: f32, square_root: bool) -> Problem {
+        let origin = f64::from(origin);
+        Problem::new(lo - origin, hi - origin, |shifted| {
+            let t = (shifted + origin).clamp(lo, hi);
             let core = self.core_value(t);
             let e = self.truth.eccentricity(if self.central { t * t } else { t });
             let e_by_core = match self.distribution.geometry() {
@@ -244,7 +338,7 @@ impl Fitter<'_> {
             ]
             .map(|x| x as f32)
         };
-        Core::Table { per_unit, first, cells: (first..last).map(cell).collect() }
+        Core::Table { per_unit: per_unit as f32, first, cells: (first..last).map(cell).collect() }
     }
 
     /// Core values at `a` and `b` and one-sided slopes there, in units of the interval.
@@ -260,11 +354,19 @@ impl Fitter<'_> {
     }
 }
 
-/// Joins the fitted piece with the flat disc before it and the flat ring after it.
+fn rounded(coefficients: &[f64]) -> Vec<f32> {
+    coefficients.iter().map(|x| *x as f32).collect()
+}
+
+fn middle([lo, hi]: [f64; 2]) -> f32 {
+    (0.5 * (lo + hi)) as f32
+}
+
+/// Joins the fitted pieces with the flat disc before it and the flat ring after it.
 fn assemble(distribution: &RadialDistribution, truth: &Truth, form: Form, fitted: Fitted) -> Inverse {
     let geometry = distribution.geometry();
     let [start, end] = fitted.range;
-    let value = |u: f64| fitted.piece.as_ref().map_or_else(|| truth.radial(u), |piece| piece.eval_f64(u).0);
+    let value = |u: f64| fitted.value(u).unwrap_or_else(|| truth.radial(u));
     let mut pieces = Vec::new();
     if start > 0.0 {
         let joint = f64::from(start as f32);
@@ -273,9 +375,9 @@ fn assemble(distribution: &RadialDistribution, truth: &Truth, form: Form, fitted
             Geometry::Plane => (value(joint) / joint.sqrt(), Outer::TimesSqrtU),
         };
         let core = Core::Polynomial(vec![coefficient as f32]);
-        pieces.push(Piece { end: start as f32, argument: Argument::U, core, outer });
+        pieces.push(Piece { end: start as f32, argument: Argument::U, origin: 0.0, core, outer });
     }
-    let name = if fitted.piece.is_some() { form.name() } else { "flat".into() };
+    let name = if fitted.pieces.is_empty() { "flat".into() } else { form.name() };
     if end < 1.0 {
         let joint = f64::from(end as f32);
         // The geometry's area is linear in U: v on the sphere, e^2 on the plane.
@@ -284,10 +386,10 @@ fn assemble(distribution: &RadialDistribution, truth: &Truth, form: Form, fitted
         let slope = (at_cap - at_joint) / (1.0 - joint);
         let core = Core::Polynomial(vec![(at_cap - slope) as f32, slope as f32]);
         let outer = if geometry == Geometry::Sphere { Outer::Identity } else { Outer::Sqrt };
-        pieces.extend(fitted.piece);
-        pieces.push(Piece { end: 1.0, argument: Argument::U, core, outer });
+        pieces.extend(fitted.pieces);
+        pieces.push(Piece { end: 1.0, argument: Argument::U, origin: 0.0, core, outer });
     } else {
-        pieces.extend(fitted.piece);
+        pieces.extend(fitted.pieces);
     }
     finish(distribution, name, pieces)
 }
@@ -302,13 +404,13 @@ fn round_down(x: f64) -> f32 {
 fn finish(distribution: &RadialDistribution, name: String, pieces: Vec<Piece>) -> Inverse {
     let geometry = distribution.geometry();
     let kappa = distribution.outer_ratio();
+    let pieces: Vec<Piece> =
+        if kappa > 0.0 { pieces.into_iter().map(|piece| piece.rescaled(1.0 + kappa)).collect() } else { pieces };
     let tail = (kappa > 0.0).then(|| {
-        let scale = (1.0 + kappa) as f32;
         let joint = 1.0 / (1.0 + kappa);
-        let last = pieces.last().expect("an inverse has at least one piece");
-        let at_cap = last.eval_f64(1.0).0;
+        let at_cap = pieces.last().expect("an inverse has at least one piece").eval_f64(joint).0;
         let versine = if geometry == Geometry::Sphere { at_cap } else { Angle::from_radians(at_cap).versine() };
-        Tail { scale, joint, start: round_down(joint), slope: ((2.0 - versine) / (1.0 - joint)) as f32 }
+        Tail { joint, start: round_down(joint), slope: ((2.0 - versine) / (1.0 - joint)) as f32 }
     });
     let mut inverse = Inverse { name, geometry, pieces, tail, bound: ErrorBound::UNKNOWN };
     inverse.bound = measure(&inverse, distribution, MEASURE_POINTS).bound();

@@ -205,8 +205,7 @@ impl ErrorReport {
 /// The errors of the map itself (f64): density and CDF.
 fn measure_map(inverse: &Inverse, distribution: &RadialDistribution, count: u32) -> ErrorReport {
     let mut report = ErrorReport::empty(count);
-    let scale = inverse.tail().map_or(1.0, |tail| f64::from(tail.scale));
-    let joints = inverse.pieces().iter().map(|piece| f64::from(piece.end) / scale);
+    let joints = inverse.pieces().iter().map(|piece| f64::from(piece.end));
     let both_sides = joints.flat_map(|u| [u * (1.0 - 1e-7), u * (1.0 + 1e-7)]);
     for u in (0..count).map(|k| (f64::from(k) + 0.5) / f64::from(count)).chain(both_sides).filter(|u| *u <= 1.0) {
         let (radial, _) = inverse.eval_f64(u);
