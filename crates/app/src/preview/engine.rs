@@ -99,7 +99,7 @@ pub struct State {
     pub film: String,
     /// The mode of the last batch.
     pub mode: Option<Mode>,
-    /// The thread has stopped for good: the device is lost, or it panicked.
+    /// The thread has stopped for good, by a panic; standard error has the reason.
     pub dead: bool,
 }
 
@@ -134,6 +134,7 @@ impl Engine {
             show_time: Duration::ZERO,
             shown_at: None,
             rate: Rate::default(),
+            failed: None,
         };
         let thread = std::thread::Builder::new().name("engine".into()).spawn(move || worker.run())?;
         Ok(Self { shared, requests: Some(requests), thread: Some(thread) })
@@ -187,6 +188,8 @@ struct Worker {
     show_time: Duration,
     shown_at: Option<Instant>,
     rate: Rate,
+    /// What could not be shown; not tried again until the window shows something else.
+    failed: Option<Look>,
 }
 
 impl Worker {
@@ -200,20 +203,28 @@ impl Worker {
             }
             let look = lock(&self.shared.look).clone();
             let Some(look) = look.filter(|_| self.tracing.is_open()) else { continue };
+            if self.failed.as_ref() == Some(&look) {
+                continue;
+            }
+            self.failed = None;
             if let Err(error) = self.frame(&look) {
                 self.tell(one_line(&error), true);
-                let mut state = lock(&self.shared.state);
-                state.dead = true;
-                drop(state);
-                (self.repaint)();
-                return;
+                self.failed = Some(look);
             }
         }
     }
 
     /// One batch, and a picture when it is time for one.
     fn frame(&mut self, look: &Look) -> anyhow::Result<()> {
-        if self.tracing.follow(look)? {
+        let prepares = self.tracing.must_prepare(look);
+        if prepares {
+            self.busy(Some("preparing the scene".into()));
+        }
+        let changed = self.tracing.follow(look);
+        if prepares {
+            self.busy(None);
+        }
+        if changed? {
             self.pacing.restart();
         }
         if !look.controls.paused {
@@ -265,7 +276,7 @@ impl Worker {
 
     /// The next request, waiting a little for one when there is nothing to trace.
     fn next_request(&self) -> Result<Option<Request>, Closed> {
-        let up_to_date = |look: &Look| look.controls.paused && !self.is_due(look);
+        let up_to_date = |look: &Look| self.failed.as_ref() == Some(look) || look.controls.paused && !self.is_due(look);
         let idle = !self.tracing.is_open() || lock(&self.shared.look).as_ref().is_none_or(up_to_date);
         if idle {
             match self.inbox.recv_timeout(IDLE) {

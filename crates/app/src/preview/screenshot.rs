@@ -45,9 +45,14 @@ impl Screenshot {
             self.leave(ctx, written.map(|()| figures(state)).map_err(Into::into));
             return;
         }
-        let failed = state.scene.is_none() && state.busy.is_none();
-        if let Some(message) = state.message.as_ref().filter(|message| message.wrong && (failed || state.dead)) {
-            self.leave(ctx, Err(anyhow::anyhow!("{}", message.text)));
+        let failed = state.picture.is_none() && state.busy.is_none();
+        let reason = match &state.message {
+            _ if state.dead => Some("the renderer has stopped"),
+            Some(message) if message.wrong && failed => Some(message.text.as_str()),
+            _ => None,
+        };
+        if let Some(reason) = reason {
+            self.leave(ctx, Err(anyhow::anyhow!("{reason}")));
             return;
         }
         if state.picture.is_none() {

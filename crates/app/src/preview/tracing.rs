@@ -133,6 +133,12 @@ impl Tracing {
         Some([plan.options.width, plan.options.height])
     }
 
+    /// Whether [`Tracing::follow`] will take long: it makes a film and puts the scene on the device.
+    pub fn must_prepare(&self, look: &Look) -> bool {
+        let plan = self.open.as_ref().and_then(|open| open.plan);
+        plan.is_none_or(|plan| !plan.suits(&look.standpoint.view, look.size_px.as_vec2()))
+    }
+
     /// Brings film, pose and distribution in line with what the window shows. True when the picture changes at once.
     pub fn follow(&mut self, look: &Look) -> anyhow::Result<bool> {
         let Look { standpoint, controls, size_px, mapping, .. } = look;
