@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, bail};
 use glam::{Quat, Vec3};
-use tracer::import::{ImportOptions, ImportReport};
+use tracer::import::{ImportOptions, ImportReport, ImportWarning};
 use tracer::scene::{Environment, Projection, Scene};
 
 use crate::cli::SceneArgs;
@@ -54,19 +54,56 @@ pub struct Viewpoint {
     pub vfov: f32,
 }
 
+/// A scene with what there is to say about it.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// The scene in its environment.
+    pub scene: Arc<Scene>,
+    /// What was not supported, repaired or replaced, one line each.
+    pub notes: Vec<String>,
+}
+
 /// Loads a scene and puts the environment that was asked for around it.
-pub fn load(source: &Source, args: &SceneArgs) -> anyhow::Result<(Arc<Scene>, ImportReport)> {
-    let (mut scene, report) = match source {
-        Source::BuiltIn => anyhow::bail!("there is no built-in scene yet: name a file"),
-        Source::File(path) => tracer::import::load_gltf(path, &ImportOptions::default())?,
+///
+/// # Errors
+/// When the scene or the environment image cannot be read.
+pub fn load(source: &Source, args: &SceneArgs) -> anyhow::Result<Loaded> {
+    let (mut scene, report) = import(source)?;
+    let mut warnings = report.warnings;
+    let mut repaired = None;
+    let environment = match (&args.background, &args.env) {
+        (Some(background), _) => Some(Environment::Constant(Vec3::from_array(background.0))),
+        (None, Some(path)) => {
+            let loaded = tracer::environment::load(path)?;
+            repaired = (loaded.repaired_texels > 0).then(|| {
+                format!(
+                    "{}: {} texels were negative or not finite and became 0",
+                    path.display(),
+                    loaded.repaired_texels
+                )
+            });
+            let image = Arc::new(loaded.image);
+            Some(Environment::Image { image, rotation_deg: args.env_rotate, intensity: 1.0 })
+        }
+        (None, None) => None,
     };
-    if let Some(background) = args.background {
-        scene.environment = Environment::Constant(Vec3::from_array(background.0));
+    if let Some(environment) = environment {
+        scene.environment = environment;
+        warnings.retain(|warning| *warning != ImportWarning::NoLight);
     }
-    if let Some(path) = &args.env {
-        anyhow::bail!("{}: environment images are not read yet", path.display());
+    let notes = warnings.iter().map(ToString::to_string).chain(repaired).collect();
+    Ok(Loaded { scene: Arc::new(scene), notes })
+}
+
+/// Reads a scene as it is.
+///
+/// # Errors
+/// When it cannot be read.
+pub fn import(source: &Source) -> anyhow::Result<(Scene, ImportReport)> {
+    match source {
+        Source::BuiltIn => tracer::builtin::scene().context("the built-in scene"),
+        Source::File(path) => Ok(tracer::import::load_gltf(path, &ImportOptions::default())?),
     }
-    Ok((Arc::new(scene), report))
 }
 
 /// The scene's cameras, or the one that frames it.

@@ -1,7 +1,7 @@
 //! `fovea info`: what a scene holds, and what of it is not supported.
 
 use serde_json::{Value, json};
-use tracer::import::{ImportOptions, ImportReport};
+use tracer::import::ImportReport;
 use tracer::scene::{Environment, Projection, PunctualKind, Scene};
 
 use super::{print_json, print_text};
@@ -14,10 +14,7 @@ use crate::settings::scene_hash;
 /// # Errors
 /// When the scene cannot be loaded.
 pub fn run(args: &InfoArgs) -> anyhow::Result<()> {
-    let (scene, report) = match Source::from(args.scene.as_deref()) {
-        Source::BuiltIn => anyhow::bail!("there is no built-in scene yet: name a file"),
-        Source::File(path) => tracer::import::load_gltf(&path, &ImportOptions::default())?,
-    };
+    let (scene, report) = session::import(&Source::from(args.scene.as_deref()))?;
     if args.json { print_json(&describe(&scene, &report)) } else { print_text(&text(&scene, &report)) }
 }
 

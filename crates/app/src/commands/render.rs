@@ -22,7 +22,7 @@ use crate::output::exr::{self, FilmFile};
 use crate::output::{ImageFormat, check_writable, png};
 use crate::readback;
 use crate::sampling::{Aim, GazePoint};
-use crate::session::{self, Source, Viewpoint};
+use crate::session::{self, Loaded, Source, Viewpoint};
 use crate::settings::{RunSettings, mode_name};
 use crate::view::direction;
 
@@ -40,10 +40,10 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     check_writable(&args.output)?;
     let source = Source::from(args.scene.scene.as_deref());
     let import_start = Instant::now();
-    let (scene, import) = session::load(&source, &args.scene)?;
+    let Loaded { scene, notes } = session::load(&source, &args.scene)?;
     let import_seconds = import_start.elapsed().as_secs_f64();
-    for warning in import.warnings.iter().filter(|_| !args.json) {
-        eprintln!("note: {warning}");
+    for note in &notes {
+        eprintln!("note: {note}");
     }
     let viewpoints = session::viewpoints(&scene);
     let camera = &viewpoints[session::choose(&viewpoints, args.scene.camera.as_ref())?];

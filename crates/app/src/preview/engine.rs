@@ -25,6 +25,14 @@ use crate::session::{Source, one_line};
 
 /// How long a thread with nothing to trace sleeps between looks at what the window wants.
 const IDLE: Duration = Duration::from_millis(50);
+/// How long after the last movement the picture is drawn in full again.
+const SETTLED: Duration = Duration::from_millis(250);
+/// A picture that takes longer than this is drawn coarser while the view moves.
+const SMOOTH_ENOUGH: Duration = Duration::from_millis(30);
+/// Pixels a texel, along each axis, while the view moves.
+const COARSE_WHILE_MOVING: u32 = 2;
+/// How often figures are read from the device.
+const READ_INTERVAL: Duration = Duration::from_millis(300);
 /// Over how long a rate is averaged.
 const RATE_WINDOW: Duration = Duration::from_millis(800);
 
@@ -99,7 +107,7 @@ pub struct State {
     pub film: String,
     /// The mode of the last batch.
     pub mode: Option<Mode>,
-    /// The thread has stopped for good: the device is lost, or it panicked.
+    /// The thread has stopped for good, by a panic; standard error has the reason.
     pub dead: bool,
 }
 
@@ -132,8 +140,12 @@ impl Engine {
             repaint: Box::new(repaint),
             shown: None,
             show_time: Duration::ZERO,
-            shown_at: None,
+            moved_at: None,
             rate: Rate::default(),
+            read_at: None,
+            spp_at_gaze: 0.0,
+            non_finite_dropped: 0,
+            failed: None,
         };
         let thread = std::thread::Builder::new().name("engine".into()).spawn(move || worker.run())?;
         Ok(Self { shared, requests: Some(requests), thread: Some(thread) })
@@ -181,12 +193,18 @@ struct Worker {
     tracing: Tracing,
     pacing: Pacing,
     repaint: Box<dyn Fn() + Send>,
-    /// What the picture on screen shows, and the samples in it.
-    shown: Option<(Look, u64)>,
-    /// How long drawing the picture takes.
+    shown: Option<Shown>,
+    /// How long drawing the picture in full takes.
     show_time: Duration,
-    shown_at: Option<Instant>,
+    /// When the view last moved.
+    moved_at: Option<Instant>,
     rate: Rate,
+    /// When the two figures below were last read from the device, which waits for it.
+    read_at: Option<Instant>,
+    spp_at_gaze: f32,
+    non_finite_dropped: u64,
+    /// What could not be shown; not tried again until the window shows something else.
+    failed: Option<Look>,
 }
 
 impl Worker {
@@ -200,21 +218,30 @@ impl Worker {
             }
             let look = lock(&self.shared.look).clone();
             let Some(look) = look.filter(|_| self.tracing.is_open()) else { continue };
+            if self.failed.as_ref() == Some(&look) {
+                continue;
+            }
+            self.failed = None;
             if let Err(error) = self.frame(&look) {
                 self.tell(one_line(&error), true);
-                let mut state = lock(&self.shared.state);
-                state.dead = true;
-                drop(state);
-                (self.repaint)();
-                return;
+                self.failed = Some(look);
             }
         }
     }
 
     /// One batch, and a picture when it is time for one.
     fn frame(&mut self, look: &Look) -> anyhow::Result<()> {
-        if self.tracing.follow(look)? {
+        let prepares = self.tracing.must_prepare(look);
+        if prepares {
+            self.busy(Some("preparing the scene".into()));
+        }
+        let changed = self.tracing.follow(look);
+        if prepares {
+            self.busy(None);
+        }
+        if changed? {
             self.pacing.restart();
+            self.moved_at = Some(Instant::now());
         }
         if !look.controls.paused {
             let batch = self.pacing.batch();
@@ -230,27 +257,42 @@ impl Worker {
 
     /// A picture is due when what it shows has changed, or when its share of the time has come.
     fn is_due(&self, look: &Look) -> bool {
-        let Some((shown, samples)) = &self.shown else { return true };
-        if shown.standpoint != look.standpoint || shown.size_px != look.size_px || shown.controls != look.controls {
-            return true;
-        }
-        let waited = self.shown_at.map_or(Duration::MAX, |at| at.elapsed());
-        *samples != self.tracing.samples() && waited >= self.pacing.show_interval(self.show_time)
+        let Some(shown) = &self.shown else { return true };
+        let last = &shown.look;
+        shown.coarseness > self.coarseness()
+            || last.standpoint != look.standpoint
+            || last.size_px != look.size_px
+            || last.controls != look.controls
+            || shown.samples != self.tracing.samples()
+                && shown.at.elapsed() >= self.pacing.show_interval(self.show_time)
+    }
+
+    /// Coarser while the view moves, where drawing is slow: then the frame rate counts.
+    fn coarseness(&self) -> u32 {
+        let moving = self.moved_at.is_some_and(|at| at.elapsed() < SETTLED);
+        if moving && self.show_time > SMOOTH_ENOUGH { COARSE_WHILE_MOVING } else { 1 }
     }
 
     fn show(&mut self, look: &Look) -> anyhow::Result<()> {
         let start = Instant::now();
-        let picture = self.tracing.show(look)?;
-        self.show_time = start.elapsed();
-        self.shown_at = Some(Instant::now());
+        let coarseness = self.coarseness();
+        let picture = self.tracing.show(look, coarseness)?;
+        if coarseness == 1 {
+            self.show_time = start.elapsed();
+        }
         let samples = self.tracing.samples();
-        self.shown = Some((look.clone(), samples));
+        self.shown = Some(Shown { look: look.clone(), samples, coarseness, at: Instant::now() });
+        if self.read_at.is_none_or(|at| at.elapsed() >= READ_INTERVAL) {
+            self.spp_at_gaze = self.tracing.samples_at(look.standpoint.view.direction_at(look.gaze.point))?;
+            self.non_finite_dropped = self.tracing.non_finite_dropped()?;
+            self.read_at = Some(Instant::now());
+        }
         let readout = Readout {
             samples,
             samples_per_s: self.rate.per_second(),
-            spp_at_gaze: self.tracing.samples_at(look.standpoint.view.direction_at(look.gaze.point))?,
+            spp_at_gaze: self.spp_at_gaze,
             elapsed: self.tracing.elapsed(),
-            non_finite_dropped: self.tracing.non_finite_dropped()?,
+            non_finite_dropped: self.non_finite_dropped,
         };
         let film = self.tracing.film_size().map(|[width, height]| format!("{width}x{height}")).unwrap_or_default();
         let mut state = lock(&self.shared.state);
@@ -265,7 +307,7 @@ impl Worker {
 
     /// The next request, waiting a little for one when there is nothing to trace.
     fn next_request(&self) -> Result<Option<Request>, Closed> {
-        let up_to_date = |look: &Look| look.controls.paused && !self.is_due(look);
+        let up_to_date = |look: &Look| self.failed.as_ref() == Some(look) || look.controls.paused && !self.is_due(look);
         let idle = !self.tracing.is_open() || lock(&self.shared.look).as_ref().is_none_or(up_to_date);
         if idle {
             match self.inbox.recv_timeout(IDLE) {
@@ -310,8 +352,8 @@ impl Worker {
 
     /// Reads the film back here and writes the file elsewhere: compressing a large film takes seconds.
     fn save_exr(&mut self, path: PathBuf) -> anyhow::Result<Option<String>> {
-        let (look, _) = self.shown.as_ref().context("there is no picture yet")?;
-        let film = self.tracing.film(look)?;
+        let shown = self.shown.as_ref().context("there is no picture yet")?;
+        let film = self.tracing.film(&shown.look)?;
         let shared = Arc::clone(&self.shared);
         std::thread::Builder::new().name("save".into()).spawn(move || {
             let message = match exr::write(&path, film) {
@@ -348,6 +390,16 @@ impl Worker {
         lock(&self.shared.state).message = Some(Message::now(text, wrong));
         (self.repaint)();
     }
+}
+
+/// The picture on screen.
+struct Shown {
+    look: Look,
+    /// In the film at that time.
+    samples: u64,
+    /// Pixels a texel along each axis.
+    coarseness: u32,
+    at: Instant,
 }
 
 /// The window is gone.

@@ -4,6 +4,10 @@ use std::time::Duration;
 
 /// The first batch after a change: small, so that the change shows at once.
 pub const FIRST_BATCH: u32 = 1 << 14;
+/// The first batch of all on an adapter that renders on the CPU, where nothing is known of the scene yet.
+const FIRST_BATCH_ON_CPU: u32 = 1 << 12;
+/// What the first batch after a change may take, where the scene's speed is known.
+const RESPONSE: Duration = Duration::from_millis(30);
 /// No batch is planned to take longer: graphics drivers reset a device that seems to hang.
 const LONGEST_BATCH: Duration = Duration::from_millis(220);
 /// What a frame may take where the adapter can.
@@ -19,17 +23,20 @@ pub struct Pacing {
     /// The adapter is a CPU: showing a picture takes time from tracing it.
     software: bool,
     batch: u32,
+    /// Of the last batch.
+    samples_per_s: Option<f64>,
 }
 
 impl Pacing {
     /// For an adapter that renders on the CPU (`software`) or a graphics card.
     pub fn new(software: bool) -> Self {
-        Self { software, batch: FIRST_BATCH }
+        Self { software, batch: if software { FIRST_BATCH_ON_CPU } else { FIRST_BATCH }, samples_per_s: None }
     }
 
     /// Starts small again, after a change that should show at once.
     pub fn restart(&mut self) {
-        self.batch = self.batch.min(FIRST_BATCH);
+        let responsive = self.samples_per_s.map_or(u32::MAX, |rate| (rate * RESPONSE.as_secs_f64()) as u32);
+        self.batch = self.batch.min(FIRST_BATCH).min(responsive.max(SMALLEST_BATCH));
     }
 
     /// Samples of the next batch.
@@ -44,8 +51,9 @@ impl Pacing {
 
     /// Takes in that the last batch of `samples` took `trace`, and that showing a picture takes `show`.
     pub fn measured(&mut self, samples: u32, trace: Duration, show: Duration) {
-        let target = self.target(show).as_secs_f64();
-        let wanted = f64::from(samples) * target / trace.as_secs_f64().max(1e-6);
+        let samples_per_s = f64::from(samples) / trace.as_secs_f64().max(1e-6);
+        self.samples_per_s = Some(samples_per_s);
+        let wanted = samples_per_s * self.target(show).as_secs_f64();
         let ceiling = self.batch.saturating_mul(2);
         // The cast saturates; the clamp below bounds what it gives.
         self.batch = (wanted as u32).clamp(SMALLEST_BATCH, ceiling.max(SMALLEST_BATCH));
@@ -101,6 +109,18 @@ mod tests {
         assert!(seconds <= LONGEST_BATCH.as_secs_f64() + 1e-3, "{seconds}");
         let (samples, _) = settle(Pacing::new(true), 1.0, Duration::ZERO, 3);
         assert_eq!(samples, SMALLEST_BATCH);
+    }
+
+    #[test]
+    fn a_slow_scene_answers_a_change_within_a_thirtieth_of_a_second() {
+        let mut pacing = Pacing::new(true);
+        for _ in 0..20 {
+            let trace = Duration::from_secs_f64(f64::from(pacing.batch()) / 1e5);
+            pacing.measured(pacing.batch(), trace, Duration::from_millis(50));
+        }
+        assert!(pacing.batch() > 10_000);
+        pacing.restart();
+        assert!(pacing.batch().abs_diff(3000) <= 1, "{}", pacing.batch());
     }
 
     #[test]

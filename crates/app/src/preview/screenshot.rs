@@ -23,6 +23,10 @@ pub struct Screenshot {
     /// Since the first picture.
     since: Option<Instant>,
     asked: bool,
+    /// Frames drawn since then, when the last one was, and the longest time between two.
+    frames: u32,
+    last_frame: Option<Instant>,
+    longest_frame: Duration,
     sender: Sender<Arc<ColorImage>>,
     receiver: Receiver<Arc<ColorImage>>,
 }
@@ -32,7 +36,18 @@ impl Screenshot {
     pub fn new(after_secs: f64, path: PathBuf, outcome: Outcome) -> Self {
         let (sender, receiver) = channel();
         let after = Duration::try_from_secs_f64(after_secs).unwrap_or_default();
-        Self { after, path, outcome, since: None, asked: false, sender, receiver }
+        Self {
+            after,
+            path,
+            outcome,
+            since: None,
+            asked: false,
+            frames: 0,
+            last_frame: None,
+            longest_frame: Duration::ZERO,
+            sender,
+            receiver,
+        }
     }
 
     /// To be called every frame.
@@ -42,18 +57,27 @@ impl Screenshot {
             let texels: Vec<[u8; 4]> = image.pixels.iter().map(|pixel| pixel.to_array()).collect();
             let size = image.size.map(|side| side as u32);
             let written = png::write(&self.path, size[0], size[1], &texels);
-            self.leave(ctx, written.map(|()| figures(state)).map_err(Into::into));
+            self.leave(ctx, written.map(|()| self.figures(state)).map_err(Into::into));
             return;
         }
-        let failed = state.scene.is_none() && state.busy.is_none();
-        if let Some(message) = state.message.as_ref().filter(|message| message.wrong && (failed || state.dead)) {
-            self.leave(ctx, Err(anyhow::anyhow!("{}", message.text)));
+        let failed = state.picture.is_none() && state.busy.is_none();
+        let reason = match &state.message {
+            _ if state.dead => Some("the renderer has stopped"),
+            Some(message) if message.wrong && failed => Some(message.text.as_str()),
+            _ => None,
+        };
+        if let Some(reason) = reason {
+            self.leave(ctx, Err(anyhow::anyhow!("{reason}")));
             return;
         }
         if state.picture.is_none() {
             return;
         }
-        let since = *self.since.get_or_insert_with(Instant::now);
+        let now = Instant::now();
+        let since = *self.since.get_or_insert(now);
+        self.frames += 1;
+        self.longest_frame = self.longest_frame.max(self.last_frame.map_or(Duration::ZERO, |last| now - last));
+        self.last_frame = Some(now);
         if !self.asked && since.elapsed() >= self.after {
             self.asked = true;
             let (sender, ctx_of_reply) = (self.sender.clone(), ctx.clone());
@@ -70,16 +94,20 @@ impl Screenshot {
         *self.outcome.lock().unwrap_or_else(PoisonError::into_inner) = Some(outcome);
         ctx.send_viewport_cmd(ViewportCommand::Close);
     }
-}
 
-fn figures(state: &State) -> Value {
-    let readout = &state.readout;
-    json!({
-        "samples": readout.samples,
-        "samples_per_s": readout.samples_per_s,
-        "spp_at_gaze": readout.spp_at_gaze,
-        "elapsed_s": readout.elapsed.as_secs_f64(),
-        "film": state.film,
-        "mode": state.mode.map(mode_name),
-    })
+    fn figures(&self, state: &State) -> Value {
+        let readout = &state.readout;
+        let seconds = self.since.map_or(0.0, |since| since.elapsed().as_secs_f64());
+        json!({
+            "samples": readout.samples,
+            "samples_per_s": readout.samples_per_s,
+            "spp_at_gaze": readout.spp_at_gaze,
+            "tracing_s": readout.elapsed.as_secs_f64(),
+            "shown_s": seconds,
+            "frames": self.frames,
+            "longest_frame_ms": self.longest_frame.as_secs_f64() * 1e3,
+            "film": state.film,
+            "mode": state.mode.map(mode_name),
+        })
+    }
 }

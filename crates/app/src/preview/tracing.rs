@@ -22,7 +22,7 @@ use crate::output::exr::FilmFile;
 use crate::output::png;
 use crate::readback;
 use crate::sampling::{Acuity, Aim, GazePoint};
-use crate::session::{self, Source, Viewpoint};
+use crate::session::{self, Loaded, Source, Viewpoint};
 use crate::settings::RunSettings;
 use crate::view::View;
 
@@ -93,9 +93,12 @@ impl Tracing {
 
     /// Loads a scene; the last one stays if that fails.
     pub fn open(&mut self, source: &Source) -> anyhow::Result<OpenScene> {
-        let (scene, report) = session::load(source, &self.args.scene)?;
+        let Loaded { scene, mut notes } = session::load(source, &self.args.scene)?;
         let viewpoints = session::viewpoints(&scene);
-        let start = session::choose(&viewpoints, self.args.scene.camera.as_ref()).unwrap_or(0);
+        let start = session::choose(&viewpoints, self.args.scene.camera.as_ref()).unwrap_or_else(|error| {
+            notes.insert(0, session::one_line(&error));
+            0
+        });
         let lights = scene.lights.len();
         let contents = format!(
             "{} triangles, {} textures{}",
@@ -103,12 +106,6 @@ impl Tracing {
             scene.textures.len(),
             if lights == 0 { String::new() } else { format!(", {lights} lights") },
         );
-        let mut notes: Vec<String> = report.warnings.iter().map(ToString::to_string).collect();
-        if let (Some(camera), true) = (&self.args.scene.camera, notes.is_empty() || start == 0)
-            && session::choose(&viewpoints, Some(camera)).is_err()
-        {
-            notes.insert(0, "the camera asked for is not in this scene".into());
-        }
         let (low, high) = session::bounds(&scene).unwrap_or((Vec3::ZERO, Vec3::ONE));
         let name = scene.name.clone();
         self.set_scene(scene)?;
@@ -131,6 +128,12 @@ impl Tracing {
     pub fn film_size(&self) -> Option<[u32; 2]> {
         let plan = self.open.as_ref()?.plan?;
         Some([plan.options.width, plan.options.height])
+    }
+
+    /// Whether [`Tracing::follow`] will take long: it makes a film and puts the scene on the device.
+    pub fn must_prepare(&self, look: &Look) -> bool {
+        let plan = self.open.as_ref().and_then(|open| open.plan);
+        plan.is_none_or(|plan| !plan.suits(&look.standpoint.view, look.size_px.as_vec2()))
     }
 
     /// Brings film, pose and distribution in line with what the window shows. True when the picture changes at once.
@@ -208,10 +211,10 @@ impl Tracing {
         Ok(took)
     }
 
-    /// Draws the picture and waits for it.
-    pub fn show(&mut self, look: &Look) -> anyhow::Result<Picture> {
+    /// Draws the picture, with one texel for `coarseness` by `coarseness` pixels, and waits for it.
+    pub fn show(&mut self, look: &Look, coarseness: u32) -> anyhow::Result<Picture> {
         let limit = self.gpu.device.limits().max_texture_dimension_2d;
-        let size = look.size_px.clamp(UVec2::ONE, UVec2::splat(limit)).to_array();
+        let size = (look.size_px / coarseness.max(1)).clamp(UVec2::ONE, UVec2::splat(limit)).to_array();
         if self.target.as_ref().is_none_or(|target| [target.texture.width(), target.texture.height()] != size) {
             self.generations += 1;
             let texture = readback::picture_texture(&self.gpu, size);

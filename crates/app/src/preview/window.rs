@@ -129,12 +129,16 @@ impl Window {
             overlay::message(ctx, busy, false, true);
             return;
         }
+        if state.dead {
+            overlay::message(ctx, "the renderer has stopped; the terminal says why", true, false);
+            return;
+        }
         let Some(Message { text, wrong, at }) = &state.message else { return };
         let stays = if *wrong { COMPLAINT } else { NOTE };
         // Without a scene there is nothing else to see, so the reason stays.
         if let Some(left) = stays.checked_sub(at.elapsed()) {
             ctx.request_repaint_after(left);
-        } else if state.scene.is_some() && !state.dead {
+        } else if state.scene.is_some() {
             return;
         }
         overlay::message(ctx, text, *wrong, false);
