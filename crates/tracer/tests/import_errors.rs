@@ -232,6 +232,13 @@ fn a_missing_emissive_texture_gives_no_light() {
     file.material(json!({"emissiveTexture": {"index": 0}, "emissiveFactor": [1, 1, 1]}));
     let scene = file.scene();
     assert_eq!(scene.textures[0].texels, [[0, 0, 0, 255]]);
+    // The same where only an unsupported extension has the image.
+    file.json["textures"] = json!([{"extensions": {"KHR_texture_basisu": {"source": 0}}}]);
+    let (scene, report) = file.load().unwrap();
+    assert_eq!((scene.textures.len(), scene.materials[0].emission), (0, Vec3::ZERO));
+    let dropped =
+        |w: &ImportWarning| matches!(w, ImportWarning::TextureDropped { slot, .. } if slot == "emissiveTexture");
+    assert!(report.warnings.iter().any(dropped), "{:?}", report.warnings);
 }
 
 #[test]

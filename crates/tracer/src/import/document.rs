@@ -128,7 +128,8 @@ impl<'a> Document<'a> {
         let root = Object::new(map, "");
         let top = Object::new(map, "document");
         let extensions_used = top.strings("extensionsUsed")?;
-        if let Some(name) = top.strings("extensionsRequired")?.into_iter().find(|name| !supported(name)) {
+        let is_fine = |name: &str| supported(name) || METADATA_EXTENSIONS.contains(&name);
+        if let Some(name) = top.strings("extensionsRequired")?.into_iter().find(|name| !is_fine(name)) {
             return Err(top.fault(ContentError::RequiredExtension(super::error::one_line(&name))));
         }
 

@@ -52,6 +52,10 @@ impl Reader<'_, '_> {
         m.normal_scale = scalar(o.object("normalTexture")?.as_ref(), "scale", 1.0)?;
         m.emission = self.color(o, "emissiveFactor", Vec3::ZERO)?;
         m.emissive_texture = self.texture(o, "emissiveTexture", TextureUse::Emission)?;
+        if m.emissive_texture.is_none() && o.map.contains_key("emissiveTexture") {
+            // A texture that was left out must not light the room.
+            m.emission = Vec3::ZERO;
+        }
         if let Some(strength) = o.extension("KHR_materials_emissive_strength")? {
             m.emission *= self.at_least(&strength, "emissiveStrength", 1.0, 0.0)?;
         }
