@@ -2,19 +2,23 @@
 
 use std::{sync::Arc, time::Instant};
 
-use glam::{Mat3, Quat, Vec3};
+use glam::{Quat, Vec3};
 use thiserror::Error;
 
+mod batch;
+mod generation;
+
+use batch::BoundKernels;
+
 use crate::{
-    coherence::order_columns,
     distribution::Distribution,
     features::Feature,
     film::{Film, FilmMapping, FilmOptions, FilmSnapshot, ReadError},
     gpu::Gpu,
     kernels::{
-        self, Kernel, KernelConstants, KernelKey, ShaderSources, WORKGROUP_SIZE,
+        self, Kernel, KernelConstants, KernelKey, ShaderSources,
         layout::{self, BatchParams, SampleRecord},
-        pipelines::{KernelError, Pipeline, PipelineCache},
+        pipelines::{KernelError, PipelineCache},
     },
     scene::Scene,
     upload::{BlasCache, SceneOnGpu, UploadError, UploadReport},
@@ -157,15 +161,6 @@ pub struct Renderer {
     samples: u64,
     first_sample: u64,
     view: ViewRenderer,
-}
-
-/// Kernels of the present scene and distribution with their bind groups.
-#[derive(Debug)]
-struct BoundKernels {
-    trace: Arc<Pipeline>,
-    trace_groups: [Option<wgpu::BindGroup>; 2],
-    accumulate: Arc<Pipeline>,
-    accumulate_groups: Vec<Option<wgpu::BindGroup>>,
 }
 
 impl Renderer {
@@ -492,148 +487,4 @@ impl Renderer {
     fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
         self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) })
     }
-
-    /// Powers of two: 16 times the brightest source is the largest sample that the film holds.
-    fn film_scales(&self) -> (f32, f32) {
-        let brightest = self.scene.as_ref().map_or(1.0, |s| s.brightest_radiance);
-        let exponent = brightest.log2().ceil().clamp(-60.0, 60.0) as i32 + 4;
-        (2f32.powi(38 - exponent), 2f32.powi(32 - exponent))
-    }
-
-    fn write_params(&self, samples: u32) -> Result<(), RenderError> {
-        let scene = self.scene.as_ref().ok_or(RenderError::NoScene)?;
-        let (layers, layer_count, _) = self.distribution.encode();
-        let first = self.first_sample + self.samples;
-        let (radiance_scale, luminance_scale) = self.film_scales();
-        let columns = order_columns(samples.max(1).ilog2());
-        let mut order = [[0; 4]; 5];
-        bytemuck::cast_slice_mut::<_, u32>(&mut order).copy_from_slice(&columns);
-        for (slab, buffer) in self.film.slabs.iter().zip(&self.params) {
-            let params = BatchParams {
-                first_index_low: first as u32,
-                first_index_high: (first >> 32) as u32,
-                sample_count: samples,
-                seed: self.options.seed,
-                film_size: [self.options.film.width, self.options.film.height],
-                max_bounces: self.options.max_bounces.min(65_000),
-                light_count: scene.light_count,
-                camera_position: self.pose.position.to_array(),
-                environment_probability: scene.environment_probability,
-                world_from_film: layout::columns(Mat3::from_quat(self.pose.world_from_film)),
-                environment_radiance: scene.environment_radiance.to_array(),
-                environment_rotation_turns: scene.environment_rotation_turns,
-                film_half_extent: self.options.film.half_extent(),
-                first_slab_pixel: slab.first_pixel,
-                slab_pixel_count: slab.pixel_count,
-                radiance_scale,
-                luminance_scale,
-                layer_count,
-                use_sobol: u32::from(self.options.sequence == SequenceKind::Sobol),
-                order,
-                layers,
-            };
-            self.gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&params));
-        }
-        Ok(())
-    }
-
-    fn upload_pixel_list(&mut self) {
-        let (_, _, pixels) = self.distribution.encode();
-        if pixels.is_empty() {
-            return;
-        }
-        let bytes: &[u8] = bytemuck::cast_slice(&pixels);
-        if self.pixel_list.size() < bytes.len() as u64 {
-            self.pixel_list = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("pixel list"),
-                size: bytes.len() as u64,
-                usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            });
-            if let (Some(scene), Some(bound)) = (&self.scene, &mut self.bound) {
-                bound.trace_groups = trace_groups(
-                    &self.gpu.device,
-                    &bound.trace,
-                    scene,
-                    [&self.params[0], &self.records, &self.pixel_list, &self.direction_numbers],
-                );
-            }
-        }
-        self.gpu.queue.write_buffer(&self.pixel_list, 0, bytes);
-    }
-
-    fn bind(&mut self) -> Result<(), RenderError> {
-        let trace_key = self.key(Kernel::Trace);
-        let accumulate_key = self.key(Kernel::Accumulate);
-        let scene = self.scene.as_ref().ok_or(RenderError::NoScene)?;
-        let device = &self.gpu.device;
-        let trace = self.pipelines.compute(device, &trace_key)?;
-        let accumulate = self.pipelines.compute(device, &accumulate_key)?;
-        let trace_groups = trace_groups(
-            device,
-            &trace,
-            scene,
-            [&self.params[0], &self.records, &self.pixel_list, &self.direction_numbers],
-        );
-        let accumulate_groups = self
-            .film
-            .slabs
-            .iter()
-            .zip(&self.params)
-            .map(|(slab, params)| {
-                accumulate.bind(
-                    device,
-                    0,
-                    &[
-                        (0, params.as_entire_binding()),
-                        (1, self.records.as_entire_binding()),
-                        (2, slab.buffer.as_entire_binding()),
-                        (3, self.film.counters.as_entire_binding()),
-                    ],
-                )
-            })
-            .collect();
-        self.bound = Some(BoundKernels { trace, trace_groups, accumulate, accumulate_groups });
-        Ok(())
-    }
-
-    /// Dispatches the kernels over no samples: some drivers compile at the first dispatch.
-    fn warm_up(&mut self) -> Result<(), RenderError> {
-        self.write_params(0)?;
-        let bound = self.bound.as_ref().ok_or(RenderError::NoScene)?;
-        let mut encoder = self.encoder("warm-up");
-        bound.record(&mut encoder, 0);
-        self.gpu.queue.submit([encoder.finish()]);
-        self.gpu.wait().map_err(|_| RenderError::DeviceLost)
-    }
-}
-
-impl BoundKernels {
-    /// One batch: trace, then add to every slab.
-    fn record(&self, encoder: &mut wgpu::CommandEncoder, samples: u32) {
-        let groups = samples.div_ceil(WORKGROUP_SIZE).max(1);
-        let workgroups = [groups.min(1 << 15), groups.div_ceil(1 << 15)];
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-            label: Some(self.trace.label()),
-            timestamp_writes: None,
-        });
-        self.trace.dispatch(&mut pass, &[&self.trace_groups[0], &self.trace_groups[1]], workgroups);
-        for group in &self.accumulate_groups {
-            self.accumulate.dispatch(&mut pass, &[group], workgroups);
-        }
-    }
-}
-
-/// Groups 0 and 1 of a path kernel; `batch` is parameters, records, pixel list, direction numbers.
-fn trace_groups(
-    device: &wgpu::Device,
-    kernel: &Pipeline,
-    scene: &SceneOnGpu,
-    batch: [&wgpu::Buffer; 4],
-) -> [Option<wgpu::BindGroup>; 2] {
-    let first: Vec<_> = (0..).zip(batch.map(wgpu::Buffer::as_entire_binding)).collect();
-    let buffers = scene.bindings.buffers.iter().map(wgpu::Buffer::as_entire_binding);
-    let textures = scene.bindings.textures.iter().map(wgpu::BindingResource::TextureView);
-    let second: Vec<_> = (0..).zip(buffers.chain(textures)).collect();
-    [kernel.bind(device, 0, &first), kernel.bind(device, 1, &second)]
 }
