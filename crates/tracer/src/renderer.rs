@@ -17,7 +17,7 @@ use crate::{
     gpu::Gpu,
     kernels::{
         self, Kernel, KernelConstants, KernelKey, ShaderSources,
-        layout::{self, BatchParams, SampleRecord},
+        layout::{BatchParams, SampleRecord},
         pipelines::{KernelError, PipelineCache},
     },
     scene::Scene,
