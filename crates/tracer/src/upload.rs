@@ -139,7 +139,7 @@ impl SceneOnGpu {
         let light_table = lights::LightTable::build(scene, &mut geometry);
         let (texels, offsets) = texels::TexelHeap::upload(gpu, &scene.textures, &mut uploader.bytes)?;
         let (materials, slots) = materials::encode(scene, &offsets);
-        let environment = environment::EnvironmentOnGpu::build(gpu, &scene.environment, &mut uploader.bytes);
+        let environment = environment::EnvironmentOnGpu::build(gpu, &scene.environment, &mut uploader.bytes)?;
         let buffers = [
             uploader.storage("hierarchy nodes", &geometry.nodes)?,
             uploader.storage("triangle positions", &geometry.positions)?,

@@ -251,7 +251,7 @@ impl ViewRenderer {
     ) -> ViewParams {
         let film_from_world = layout::columns(Mat3::from_quat(world_from_film.inverse()));
         let mut params = ViewParams {
-            view_from_kind: codes::VIEW_EQUIRECT,
+            kind: codes::VIEW_EQUIRECT,
             size: settings.size,
             world_from_view: layout::columns(Mat3::IDENTITY),
             film_from_world,
@@ -270,7 +270,7 @@ impl ViewRenderer {
             ..bytemuck::Zeroable::zeroed()
         };
         if let ViewProjection::Perspective(view) = settings.projection {
-            params.view_from_kind = codes::VIEW_PERSPECTIVE;
+            params.kind = codes::VIEW_PERSPECTIVE;
             params.world_from_view = layout::columns(Mat3::from_quat(view.world_from_view));
             params.view_half_extent = view.half_extent.to_array();
             if let Some((_, old, size)) = &self.stale {

@@ -184,13 +184,11 @@ shared! {
         shadow_rays_high: u32,
         non_finite: u32,
         clamped: u32,
-        stack_overflows: u32,
-        unused: u32,
     }
 
     /// One pass over the view's pixels.
     struct ViewParams {
-        view_from_kind: u32,
+        kind: u32,
         level: u32,
         size: [u32; 2],
         world_from_view: Columns3,

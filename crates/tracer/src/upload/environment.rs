@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::Vec3;
 
-use super::{AliasTable, lights::luminance};
+use super::{AliasTable, UploadError, lights::luminance};
 use crate::{
     gpu::Gpu,
     scene::{Environment, EnvironmentImage},
@@ -31,8 +31,8 @@ pub struct EnvironmentOnGpu {
 
 impl EnvironmentOnGpu {
     /// Uploads the image and builds the grid. Adds the bytes to `bytes`.
-    pub fn build(gpu: &Gpu, environment: &Environment, bytes: &mut u64) -> Self {
-        match environment {
+    pub fn build(gpu: &Gpu, environment: &Environment, bytes: &mut u64) -> Result<Self, UploadError> {
+        Ok(match environment {
             Environment::Constant(radiance) => Self {
                 image: upload_image(gpu, 1, 1, &[[0.0; 4]]),
                 cells: upload_image(gpu, 1, 1, &[[0.0; 4]]),
@@ -42,6 +42,15 @@ impl EnvironmentOnGpu {
                 brightest: radiance.max_element(),
             },
             Environment::Image { image, rotation_deg, intensity } => {
+                let side = u64::from(gpu.device.limits().max_texture_dimension_2d);
+                if u64::from(image.width.max(image.height)) > side {
+                    return Err(UploadError::TooLarge {
+                        what: "environment image",
+                        bytes: image.pixels.len() as u64 * 16,
+                        limit: side * side * 16,
+                        adapter: gpu.info().name.clone(),
+                    });
+                }
                 let texels: Vec<[f32; 4]> = image.pixels.iter().map(|p| [p[0], p[1], p[2], 1.0]).collect();
                 let (cells, cells_size) = importance_grid(image);
                 *bytes += (texels.len() + cells.len()) as u64 * 16;
@@ -55,7 +64,7 @@ impl EnvironmentOnGpu {
                     brightest,
                 }
             }
-        }
+        })
     }
 }
 
