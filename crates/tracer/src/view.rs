@@ -71,6 +71,9 @@ pub struct ViewSettings {
 /// Samples at which a pixel's own mean weighs as much as its neighbourhood's.
 const CONFIDENCE_SAMPLES: f32 = 1.0;
 
+/// Stops of sample density from the darkest colour of its debug view, 1/16 a pixel, to white, 4096.
+const DENSITY_STOPS: f32 = 16.0;
+
 /// Buffers of the view's size and the passes over them.
 #[derive(Debug)]
 pub(crate) struct ViewRenderer {
@@ -263,7 +266,7 @@ impl ViewRenderer {
             exposure: settings.exposure_ev.exp2(),
             tone_map: settings.tone_map as u32,
             debug_view: settings.debug_view as u32,
-            debug_scale: 0.08,
+            debug_scale: 1.0 / DENSITY_STOPS,
             fill: u32::from(settings.fill),
             stale_size: [1; 2],
             stale_half_extent: [1.0; 2],

@@ -65,8 +65,10 @@ pub struct Readout {
     pub samples_per_s: f64,
     /// Samples in the film pixel at the gaze, averaged over its neighbourhood.
     pub spp_at_gaze: f32,
-    /// Time since the film started.
+    /// Time spent tracing since the film started.
     pub elapsed: Duration,
+    /// Time spent tracing since the window opened.
+    pub traced: Duration,
     /// Samples that were not finite and were dropped.
     pub non_finite_dropped: u64,
 }

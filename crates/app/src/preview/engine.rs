@@ -142,6 +142,7 @@ impl Engine {
             show_time: Duration::ZERO,
             moved_at: None,
             rate: Rate::default(),
+            traced: Duration::ZERO,
             read_at: None,
             spp_at_gaze: 0.0,
             non_finite_dropped: 0,
@@ -199,6 +200,8 @@ struct Worker {
     /// When the view last moved.
     moved_at: Option<Instant>,
     rate: Rate,
+    /// Time spent tracing since the window opened.
+    traced: Duration,
     /// When the two figures below were last read from the device, which waits for it.
     read_at: Option<Instant>,
     spp_at_gaze: f32,
@@ -246,6 +249,7 @@ impl Worker {
         if !look.controls.paused {
             let batch = self.pacing.batch();
             let took = self.tracing.trace(batch)?;
+            self.traced += took;
             self.pacing.measured(batch, took, self.show_time);
             self.rate.add(self.tracing.samples(), Instant::now());
         }
@@ -292,6 +296,7 @@ impl Worker {
             samples_per_s: self.rate.per_second(),
             spp_at_gaze: self.spp_at_gaze,
             elapsed: self.tracing.elapsed(),
+            traced: self.traced,
             non_finite_dropped: self.non_finite_dropped,
         };
         let film = self.tracing.film_size().map(|[width, height]| format!("{width}x{height}")).unwrap_or_default();

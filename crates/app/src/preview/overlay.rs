@@ -163,7 +163,7 @@ fn picture(ui: &mut Ui, controls: &mut Controls) {
             ui.spacing_mut().item_spacing.x = 3.0;
             ui.selectable_value(&mut controls.shown, Shown::Picture, "Picture");
             ui.selectable_value(&mut controls.shown, Shown::Density, "Density")
-                .on_hover_text("Samples per film pixel, each colour step a factor of ten");
+                .on_hover_text("Samples per pixel of the view: black none, dark blue 1/16, green 16, white 4096");
         });
         ui.end_row();
     });

@@ -20,8 +20,8 @@ pub struct Screenshot {
     after: Duration,
     path: PathBuf,
     outcome: Outcome,
-    /// Since the first picture.
-    since: Option<Instant>,
+    /// When the first picture came, and the time spent tracing until then.
+    since: Option<(Instant, Duration)>,
     asked: bool,
     /// Frames drawn since then, when the last one was, and the longest time between two.
     frames: u32,
@@ -74,7 +74,7 @@ impl Screenshot {
             return;
         }
         let now = Instant::now();
-        let since = *self.since.get_or_insert(now);
+        let (since, _) = *self.since.get_or_insert((now, state.readout.traced));
         self.frames += 1;
         self.longest_frame = self.longest_frame.max(self.last_frame.map_or(Duration::ZERO, |last| now - last));
         self.last_frame = Some(now);
@@ -97,12 +97,14 @@ impl Screenshot {
 
     fn figures(&self, state: &State) -> Value {
         let readout = &state.readout;
-        let seconds = self.since.map_or(0.0, |since| since.elapsed().as_secs_f64());
+        let (since, traced) = self.since.unwrap_or((Instant::now(), readout.traced));
+        let seconds = since.elapsed().as_secs_f64();
         json!({
             "samples": readout.samples,
             "samples_per_s": readout.samples_per_s,
             "spp_at_gaze": readout.spp_at_gaze,
-            "tracing_s": readout.elapsed.as_secs_f64(),
+            "elapsed_s": readout.elapsed.as_secs_f64(),
+            "tracing_share": readout.traced.saturating_sub(traced).as_secs_f64() / seconds.max(1e-9),
             "shown_s": seconds,
             "frames": self.frames,
             "longest_frame_ms": self.longest_frame.as_secs_f64() * 1e3,

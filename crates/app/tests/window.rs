@@ -1,0 +1,122 @@
+//! The real window, on a display of its own (Xvfb), driven as a person drives it (xdotool).
+//!
+//! Needs Linux with `Xvfb` and `xdotool`, which scripts/test installs; elsewhere the test says that it did not run.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+#![cfg(target_os = "linux")]
+
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use image::RgbImage;
+use serde_json::Value;
+
+/// An X server without a screen; stopped when dropped.
+struct Display {
+    server: Child,
+    name: String,
+}
+
+impl Display {
+    /// `None` when Xvfb or xdotool is not installed.
+    fn start() -> Option<Self> {
+        Command::new("xdotool").arg("version").output().ok()?;
+        let mut server = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-screen", "0", "1280x720x24", "-nolisten", "tcp"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .ok()?;
+        let mut number = String::new();
+        BufReader::new(server.stdout.take().unwrap()).read_line(&mut number).unwrap();
+        Some(Self { server, name: format!(":{}", number.trim()) })
+    }
+
+    /// Runs xdotool; its standard output.
+    fn xdotool(&self, arguments: &str) -> String {
+        let output = Command::new("xdotool").env("DISPLAY", &self.name).args(arguments.split(' ')).output().unwrap();
+        String::from_utf8(output.stdout).unwrap().trim().to_owned()
+    }
+
+    /// Opens the built-in scene, does `actions` once there is a window, and returns what the window showed and said.
+    fn session(&self, seconds: u32, actions: impl Fn(&Self)) -> (RgbImage, Value) {
+        let picture = std::env::temp_dir().join(format!(
+            "fovea-window-{}-{}.png",
+            std::process::id(),
+            self.name.trim_start_matches(':')
+        ));
+        let mut window = Command::new(env!("CARGO_BIN_EXE_fovea"))
+            .env("DISPLAY", &self.name)
+            .env_remove("WAYLAND_DISPLAY")
+            .args(["--screenshot-after", &seconds.to_string(), "--screenshot", picture.to_str().unwrap()])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let start = Instant::now();
+        let id = loop {
+            let id = self.xdotool("search --onlyvisible --name Fovea");
+            if !id.is_empty() {
+                break id;
+            }
+            if window.try_wait().unwrap().is_some() {
+                let output = window.wait_with_output().unwrap();
+                panic!("no window: {}", String::from_utf8_lossy(&output.stderr));
+            }
+            assert!(start.elapsed() < Duration::from_secs(60), "no window after a minute");
+            std::thread::sleep(Duration::from_millis(100));
+        };
+        // There is no window manager to give the window the keyboard.
+        self.xdotool(&format!("windowfocus --sync {id}"));
+        actions(self);
+        let output = window.wait_with_output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let shown = image::open(&picture).unwrap().to_rgb8();
+        std::fs::remove_file(picture).unwrap();
+        (shown, serde_json::from_slice(&output.stdout).unwrap())
+    }
+}
+
+impl Drop for Display {
+    fn drop(&mut self) {
+        // It may have ended by itself; either way it must not outlive the test.
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+/// Mean of all channels in a square of 81 pixels a side.
+fn brightness(picture: &RgbImage, x: u32, y: u32) -> f64 {
+    let square = (x - 40..=x + 40).flat_map(|x| (y - 40..=y + 40).map(move |y| (x, y)));
+    let values = square.flat_map(|(x, y)| picture.get_pixel(x, y).0.map(f64::from));
+    values.sum::<f64>() / f64::from(81 * 81 * 3)
+}
+
+#[test]
+fn the_fovea_follows_the_pointer_and_most_of_the_time_goes_into_tracing() {
+    let Some(display) = Display::start() else {
+        eprintln!(
+            "SKIP the_fovea_follows_the_pointer_and_most_of_the_time_goes_into_tracing: Xvfb or xdotool is missing"
+        );
+        return;
+    };
+    let (left, right, y) = (480, 1060, 420);
+    for (gaze, other) in [(left, right), (right, left)] {
+        let (shown, figures) = display.session(5, |display| {
+            display.xdotool(&format!("mousemove {gaze} {y}"));
+            std::thread::sleep(Duration::from_millis(500));
+            // The film starts again, so that nothing in it is older than the gaze; the picture shows its density.
+            display.xdotool("key r");
+            display.xdotool("key x");
+        });
+        assert_eq!(shown.dimensions(), (1280, 720));
+        let ratio = brightness(&shown, gaze, y) / brightness(&shown, other, y);
+        assert!(ratio > 1.2, "gaze at {gaze}: density {ratio} times that at {other}; {figures}");
+        let number = |key: &str| figures[key].as_f64().unwrap();
+        assert!(number("samples") > 0.0 && number("spp_at_gaze") > 0.0, "{figures}");
+        assert_eq!(figures["mode"], "fv");
+        // What is left for the window: the picture, the overlay, and what other programs take from both.
+        assert!(number("tracing_share") > 0.6, "{figures}");
+        eprintln!("gaze at {gaze}: density ratio {ratio:.2}, {figures}");
+    }
+}
