@@ -3,6 +3,9 @@
 
 cd "$(dirname "${BASH_SOURCE[0]}")/.." || exit 2
 
+# Mesa's layer that picks a default GPU complains on standard error where there is no session; nothing here needs it.
+[ -n "${XDG_RUNTIME_DIR:-}" ] || export NODEVICE_SELECT=1
+
 packages=()
 
 say() { printf '%s\n' "$*" >&2; }
@@ -68,9 +71,16 @@ install_wanted() {
         as_root=(sudo)
     fi
     say "installing: ${packages[*]}"
-    "${as_root[@]}" apt-get update -qq || die "apt-get update failed"
-    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${packages[@]}" >&2 ||
+    local log
+    log=$(mktemp)
+    if ! { "${as_root[@]}" apt-get update -qq &&
+        "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${packages[@]}"; } \
+        >"$log" 2>&1; then
+        cat "$log" >&2
+        rm -f "$log"
         die "apt-get could not install ${packages[*]}"
+    fi
+    rm -f "$log"
     packages=()
 }
 
