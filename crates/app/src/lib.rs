@@ -16,3 +16,8 @@ pub mod screen;
 pub mod session;
 pub mod settings;
 pub mod view;
+
+/// The README's example compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;

@@ -4,7 +4,7 @@ use std::io::IsTerminal;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use glam::{Quat, Vec2};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
@@ -15,7 +15,7 @@ use tracer::renderer::{FilmPose, RenderStatistics, Renderer, RendererOptions, Sc
 use tracer::view::{DebugView, ViewProjection, ViewSettings};
 
 use super::print_json;
-use crate::cli::choices::Orient;
+use crate::cli::choices::{EccentricityAt, Mode, Orient};
 use crate::cli::values::{FilmShape, ViewAngles};
 use crate::cli::{RenderArgs, StopArgs};
 use crate::output::exr::{self, FilmFile};
@@ -54,7 +54,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         readback::check_size(&gpu, [film.width, film.height])?;
     }
     let pose = FilmPose { position: camera.position, world_from_film: world_from_film(args, camera) };
-    let aim = aim(args, &film, pose.world_from_film);
+    let aim = aim(args, &film, pose.world_from_film)?;
     let inverse = args.sampling.acuity().inverse()?;
     let options = RendererOptions {
         film,
@@ -69,7 +69,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         dump_kernels(&renderer, folder)?;
     }
 
-    let seconds = trace(&mut renderer, stop(&args.stop, &film), args.json)?;
+    let seconds = trace(&mut renderer, stop(&args.stop, &film))?;
     let settings = RunSettings {
         scene: &scene,
         renderer: &options,
@@ -111,7 +111,7 @@ fn world_from_film(args: &RenderArgs, camera: &Viewpoint) -> Quat {
 }
 
 /// View and gaze, which the command line has relative to the film's centre, in the world.
-fn aim(args: &RenderArgs, film: &FilmOptions, world_from_film: Quat) -> Aim {
+fn aim(args: &RenderArgs, film: &FilmOptions, world_from_film: Quat) -> anyhow::Result<Aim> {
     let view = match (args.view, film.mapping) {
         (None, FilmMapping::Perspective { half_extent }) => {
             View { world_from_view: world_from_film, half_extent: Vec2::from(half_extent) }
@@ -131,15 +131,19 @@ fn aim(args: &RenderArgs, film: &FilmOptions, world_from_film: Quat) -> Aim {
         }
     };
     let gaze = world_from_film * direction(args.gaze.yaw_deg.to_radians(), args.gaze.pitch_deg.to_radians());
+    let on_screen = view.project(gaze).is_some_and(|point| point.abs().max_element() <= 1.0);
+    if args.eccentricity == EccentricityAt::Eye && args.sampling.mode == Mode::Fv && !on_screen {
+        bail!("--gaze lies outside --view: with --eccentricity eye one looks at the screen that shows the view");
+    }
     let screen = args.sampling.screen();
-    Aim {
+    Ok(Aim {
         mode: args.sampling.mode,
         view,
         gaze: GazePoint::towards(gaze, &view),
         clip: args.clip,
         eccentricity: args.eccentricity,
         screen_half_extent: Vec2::new(screen.width_mm, screen.height_mm) * 0.5 / screen.distance_mm,
-    }
+    })
 }
 
 fn stop(args: &StopArgs, film: &FilmOptions) -> StopCondition {
@@ -151,19 +155,19 @@ fn stop(args: &StopArgs, film: &FilmOptions) -> StopCondition {
 }
 
 /// Traces with a progress bar on a terminal; returns the seconds of tracing.
-fn trace(renderer: &mut Renderer, stop: StopCondition, quiet: bool) -> anyhow::Result<f64> {
+fn trace(renderer: &mut Renderer, stop: StopCondition) -> anyhow::Result<f64> {
     const STEPS: u64 = 1000;
-    let bar = if quiet || !std::io::stderr().is_terminal() { ProgressBar::hidden() } else { ProgressBar::new(STEPS) };
+    let bar = if std::io::stderr().is_terminal() { ProgressBar::new(STEPS) } else { ProgressBar::hidden() };
     let style =
         ProgressStyle::with_template("{bar:40} {percent:>3} %  {elapsed} elapsed, {eta} left").context("style")?;
     bar.set_style(style);
     bar.enable_steady_tick(Duration::from_millis(200));
-    let seconds = renderer.render(stop, |fraction| {
+    let outcome = renderer.render(stop, |fraction| {
         bar.set_position((fraction * STEPS as f64) as u64);
         true
-    })?;
+    });
     bar.finish_and_clear();
-    Ok(seconds)
+    Ok(outcome?)
 }
 
 fn whole_film(args: &RenderArgs, film: &FilmOptions) -> ViewSettings {
@@ -265,7 +269,7 @@ mod tests {
         {
             let args = args(line);
             let film = film_options(args.film, &camera());
-            let aim = aim(&args, &film, world_from_film(&args, &camera()));
+            let aim = aim(&args, &film, world_from_film(&args, &camera())).unwrap();
             assert!(aim.gaze.direction.distance(gaze) < 1e-5, "{line}: {}", aim.gaze.direction);
         }
     }
@@ -276,9 +280,20 @@ mod tests {
         let rotation = world_from_film(&args, &camera());
         assert_eq!(rotation, camera().rotation);
         let film = film_options(args.film, &camera());
-        let view = aim(&args, &film, rotation).view;
+        let view = aim(&args, &film, rotation).unwrap().view;
         assert_eq!(FilmMapping::Perspective { half_extent: view.half_extent.to_array() }, film.mapping);
         assert!((view.half_extent.y - 0.5_f32.tan()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn at_the_eye_the_gaze_must_be_on_the_screen() {
+        for (line, on_screen) in [("--gaze 49,0", true), ("--gaze 51,0", false), ("--gaze 180,0", false)] {
+            for (place, accepted) in [("eye", on_screen), ("scene", true)] {
+                let args = args(&format!("{line} --eccentricity {place}"));
+                let film = film_options(args.film, &camera());
+                assert_eq!(aim(&args, &film, Quat::IDENTITY).is_ok(), accepted, "{line} {place}");
+            }
+        }
     }
 
     #[test]
