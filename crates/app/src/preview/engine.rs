@@ -32,7 +32,7 @@ const SMOOTH_ENOUGH: Duration = Duration::from_millis(30);
 /// Pixels a texel, along each axis, while the view moves.
 const COARSE_WHILE_MOVING: u32 = 2;
 /// How often figures are read from the device.
-const READ_INTERVAL: Duration = Duration::from_millis(300);
+const READ_INTERVAL: Duration = Duration::from_millis(500);
 /// Over how long a rate is averaged.
 const RATE_WINDOW: Duration = Duration::from_millis(800);
 

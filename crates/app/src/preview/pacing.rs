@@ -15,7 +15,7 @@ const FRAME: Duration = Duration::from_millis(16);
 /// A batch below this many samples is mostly overhead.
 const SMALLEST_BATCH: u32 = 1 << 10;
 /// On an adapter that renders on the CPU, tracing gets this many times the time that showing the picture takes.
-const TRACE_OVER_SHOW: f64 = 3.0;
+const TRACE_OVER_SHOW: f64 = 4.0;
 
 /// Chooses batch sizes from measured times.
 #[derive(Clone, Copy, Debug)]
@@ -98,9 +98,9 @@ mod tests {
     }
 
     #[test]
-    fn a_cpu_spends_three_quarters_of_its_time_tracing() {
+    fn a_cpu_spends_four_fifths_of_its_time_tracing() {
         let (_, seconds) = settle(Pacing::new(true), 3e5, Duration::from_millis(40), 20);
-        assert!((seconds - 0.12).abs() < 1e-3, "{seconds}");
+        assert!((seconds - 0.16).abs() < 1e-3, "{seconds}");
     }
 
     #[test]

@@ -12,6 +12,9 @@ use super::engine::State;
 use crate::output::png;
 use crate::settings::mode_name;
 
+/// How often the clock is looked at; every frame costs a CPU adapter time that it does not trace.
+const LOOK_INTERVAL: Duration = Duration::from_millis(250);
+
 /// Where the outcome of a screenshot is left for whoever opened the window.
 pub type Outcome = Arc<Mutex<Option<anyhow::Result<Value>>>>;
 
@@ -52,7 +55,7 @@ impl Screenshot {
 
     /// To be called every frame.
     pub fn update(&mut self, ctx: &Context, state: &State) {
-        ctx.request_repaint_after(Duration::from_millis(50));
+        ctx.request_repaint_after(LOOK_INTERVAL);
         if let Ok(image) = self.receiver.try_recv() {
             let texels: Vec<[u8; 4]> = image.pixels.iter().map(|pixel| pixel.to_array()).collect();
             let size = image.size.map(|side| side as u32);
