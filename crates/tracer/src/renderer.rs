@@ -169,16 +169,7 @@ impl Renderer {
     /// # Errors
     /// When the film does not fit the device.
     pub fn new(gpu: &Gpu, options: &RendererOptions, distribution: Distribution) -> Result<Self, RenderError> {
-        let too_large = || RenderError::FilmTooLarge {
-            width: options.film.width,
-            height: options.film.height,
-            bytes: options.film.bytes(),
-            adapter: gpu.info().name.clone(),
-        };
-        if options.film.pixels() > u64::from(u32::MAX) || u64::from(options.film.width) * 40 > gpu.largest_binding() {
-            return Err(too_large());
-        }
-        let film = Film::new(gpu, options.film).ok_or_else(too_large)?;
+        let (film, params) = allocate_film(gpu, options.film)?;
         let buffer = |label, size: u64, usage| {
             let usage = usage | wgpu::BufferUsages::COPY_DST;
             gpu.device.create_buffer(&wgpu::BufferDescriptor {
@@ -188,11 +179,6 @@ impl Renderer {
                 mapped_at_creation: false,
             })
         };
-        let params = film
-            .slabs
-            .iter()
-            .map(|_| buffer("batch parameters", size_of::<BatchParams>() as u64, wgpu::BufferUsages::UNIFORM))
-            .collect();
         let records = buffer(
             "sample records",
             u64::from(LARGEST_BATCH) * size_of::<SampleRecord>() as u64,
@@ -243,6 +229,33 @@ impl Renderer {
         let kernel_compile_secs = started.elapsed().as_secs_f64();
         self.restart();
         Ok(SceneReport { upload, kernel_compile_secs })
+    }
+
+    /// Puts an empty film of another size or mapping in the place of the present one. What is shown meanwhile is the old
+    /// picture. A distribution over a list of film pixels is to be set anew, since their numbers differ.
+    ///
+    /// # Errors
+    /// When the film does not fit the device or a kernel for it does not compile; the last film then stays.
+    pub fn set_film(&mut self, options: FilmOptions) -> Result<(), RenderError> {
+        if options == self.options.film {
+            return Ok(());
+        }
+        let (film, params) = allocate_film(&self.gpu, options)?;
+        self.view.keep_as_stale(&self.gpu);
+        let last = (
+            std::mem::replace(&mut self.film, film),
+            std::mem::replace(&mut self.params, params),
+            std::mem::replace(&mut self.options.film, options),
+        );
+        if self.scene.is_some()
+            && let Err(error) = self.bind().and_then(|()| self.warm_up())
+        {
+            (self.film, self.params, self.options.film) = last;
+            self.bind()?;
+            return Err(error);
+        }
+        self.samples = 0;
+        Ok(())
     }
 
     /// Moves or turns the film; restarts it when that is a change.
@@ -487,4 +500,28 @@ impl Renderer {
     fn encoder(&self, label: &str) -> wgpu::CommandEncoder {
         self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some(label) })
     }
+}
+
+/// A film with the parameter buffers of its slabs.
+fn allocate_film(gpu: &Gpu, options: FilmOptions) -> Result<(Film, Vec<wgpu::Buffer>), RenderError> {
+    let too_large = || RenderError::FilmTooLarge {
+        width: options.width,
+        height: options.height,
+        bytes: options.bytes(),
+        adapter: gpu.info().name.clone(),
+    };
+    if options.pixels() > u64::from(u32::MAX) || u64::from(options.width) * 40 > gpu.largest_binding() {
+        return Err(too_large());
+    }
+    let film = Film::new(gpu, options).ok_or_else(too_large)?;
+    let params = || {
+        gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("batch parameters"),
+            size: size_of::<BatchParams>() as u64,
+            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        })
+    };
+    let params = film.slabs.iter().map(|_| params()).collect();
+    Ok((film, params))
 }

@@ -247,10 +247,9 @@ impl Worker {
             self.moved_at = Some(Instant::now());
         }
         if !look.controls.paused {
-            let batch = self.pacing.batch();
-            let took = self.tracing.trace(batch)?;
+            let (samples, took) = self.tracing.trace(self.pacing.batch())?;
             self.traced += took;
-            self.pacing.measured(batch, took, self.show_time);
+            self.pacing.measured(samples, took, self.show_time);
             self.rate.add(self.tracing.samples(), Instant::now());
         }
         if self.is_due(look) {

@@ -163,12 +163,18 @@ impl Tracing {
             let plan = FilmPlan::new(&view, size, memory);
             if open.plan != Some(plan) {
                 let distribution = aim.distribution(&plan.options, plan.world_from_film, &inverse);
-                // Both films at once might not fit.
-                open.renderer = None;
-                let options = RendererOptions { film: plan.options, ..options };
-                let mut renderer = Renderer::new(&self.gpu, &options, distribution)?;
-                renderer.set_scene(&open.scene)?;
-                open.renderer = Some(renderer);
+                match &mut open.renderer {
+                    Some(renderer) => {
+                        renderer.set_film(plan.options)?;
+                        renderer.set_distribution(distribution)?;
+                    }
+                    None => {
+                        let options = RendererOptions { film: plan.options, ..options };
+                        let mut renderer = Renderer::new(&self.gpu, &options, distribution)?;
+                        renderer.set_scene(&open.scene)?;
+                        open.renderer = Some(renderer);
+                    }
+                }
                 open.plan = Some(plan);
                 self.aim = Some(aim);
                 self.traced = Duration::ZERO;
@@ -201,14 +207,14 @@ impl Tracing {
         }
     }
 
-    /// Traces a batch, waits for it, and says how long it took.
-    pub fn trace(&mut self, samples: u32) -> anyhow::Result<Duration> {
+    /// Traces a batch of at most so many samples and waits for it. How many there were, and how long they took.
+    pub fn trace(&mut self, samples: u32) -> anyhow::Result<(u32, Duration)> {
         let start = Instant::now();
-        self.renderer()?.trace(samples)?;
+        let traced = self.renderer()?.trace(samples)?;
         self.gpu.wait().context("the graphics device was lost")?;
         let took = start.elapsed();
         self.traced += took;
-        Ok(took)
+        Ok((traced, took))
     }
 
     /// Draws the picture, with one texel for `coarseness` by `coarseness` pixels, and waits for it.
