@@ -88,7 +88,7 @@ pub fn write(path: &Path, film: FilmFile) -> std::result::Result<(), OutputError
     write_atomically(path, |writer| image.write().to_buffered(writer).map_err(|error| error.to_string()))
 }
 
-/// Reads a file that [`write`] made. Files of other programs are refused with what they lack.
+/// Reads a file that [`write()`] made. Files of other programs are refused with what they lack.
 pub fn read(path: &Path) -> std::result::Result<FilmFile, OutputError> {
     let unreadable = |reason: String| OutputError::Unreadable { path: path.to_owned(), reason };
     let file = std::fs::File::open(path).map_err(|error| unreadable(error.to_string()))?;
