@@ -73,3 +73,8 @@ pub use model::{
 };
 pub use radial::{Geometry, RadialDistribution};
 pub use warp::{GazeWarp, WarpSample};
+
+/// Compiles the README's example.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct ReadmeExample;
