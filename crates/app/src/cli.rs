@@ -9,9 +9,11 @@ use crate::sampling::Acuity;
 use crate::screen::ScreenGeometry;
 
 pub mod choices;
+pub mod sampler;
 pub mod values;
 
 use choices::{Clip, EccentricityAt, Geometry, InverseForm, Mode, Model, Orient, Sequence, ToneMapping};
+use sampler::SamplerArgs;
 use values::{CameraChoice, FilmShape, GazeAngles, Rgb, SizeMm, SizePx, ViewAngles};
 
 /// Foveated progressive preview of glTF scenes: looks converge first where you look.
@@ -35,6 +37,8 @@ pub enum Command {
     Info(InfoArgs),
     /// List the graphics adapters and which one would be used
     Adapters(AdaptersArgs),
+    /// Compare the sampler's inverses in error and speed, or evaluate one
+    Sampler(SamplerArgs),
 }
 
 /// `fovea [SCENE]`.

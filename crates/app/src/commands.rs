@@ -10,6 +10,7 @@ use crate::cli::{Cli, Command};
 pub mod adapters;
 pub mod info;
 pub mod render;
+pub mod sampler;
 
 /// Carries out a command line.
 ///
@@ -21,6 +22,7 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Some(Command::Render(args)) => render::run(&args),
         Some(Command::Info(args)) => info::run(&args),
         Some(Command::Adapters(args)) => adapters::run(&args),
+        Some(Command::Sampler(args)) => sampler::run(&args),
     }
 }
 

@@ -217,6 +217,13 @@ impl Inverse {
     pub fn measure(&self, distribution: &RadialDistribution, count: u32) -> ErrorReport {
         certify::measure(self, distribution, count)
     }
+
+    /// As [`Self::measure`] over every f32 in `[smallest, 1]`: 1.07e9 numbers from 0, minutes. Below about 2^-117 the radius on
+    /// the sphere is subnormal and loses its digits, below 2^-140 it is 0.
+    #[must_use]
+    pub fn measure_every_f32(&self, distribution: &RadialDistribution, smallest: f32) -> ErrorReport {
+        certify::measure_every_f32(self, distribution, smallest)
+    }
 }
 
 /// The forms on offer.

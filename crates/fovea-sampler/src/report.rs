@@ -10,8 +10,10 @@ pub use chart::{Chart, Mark, Shape};
 
 use crate::{Angle, ErrorReport, Form, Geometry, Inverse, RadialDistribution, SamplerError};
 
-/// The forms that reports compare, for Reddy's acuity: none is dominated by another in both error and cost but Eq. 6, which is
-/// kept because it is the paper's.
+/// The forms that reports compare, for Reddy's acuity.
+///
+/// On a CPU the tables dominate the smooth forms in both error and cost. Those are kept because of shaders, where a table is a
+/// constant array that runs many times slower; Eq. 6 is kept because it is the paper's.
 #[must_use]
 pub fn forms(geometry: Geometry) -> Vec<Form> {
     match geometry {

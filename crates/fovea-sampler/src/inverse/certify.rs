@@ -1,5 +1,7 @@
 //! Error measures of an inverse against the exact quantile, and the bound that is derived from them.
 
+use core::ops::RangeInclusive;
+
 use super::Inverse;
 use crate::truth::Truth;
 use crate::{Angle, Geometry, RadialDistribution};
@@ -110,20 +112,35 @@ impl ErrorReport {
 
 /// Measures `inverse` at `u = k / count` on all cores.
 pub(super) fn measure(inverse: &Inverse, distribution: &RadialDistribution, count: u32) -> ErrorReport {
-    let truth = Truth::new(distribution);
     let count = count.max(1);
-    let map_errors = measure_map(inverse, distribution, count.min(1 << 14));
+    let number = |k: u32| (f64::from(k) / f64::from(count)) as f32;
+    measure_numbers(inverse, distribution, 0..=count, number)
+}
+
+/// Measures `inverse` at every f32 in `[smallest, 1]` on all cores.
+pub(super) fn measure_every_f32(inverse: &Inverse, distribution: &RadialDistribution, smallest: f32) -> ErrorReport {
+    let first = smallest.clamp(0.0, 1.0).to_bits();
+    // Positive floats are ordered as their bits.
+    measure_numbers(inverse, distribution, first..=1f32.to_bits(), f32::from_bits)
+}
+
+fn measure_numbers(
+    inverse: &Inverse,
+    distribution: &RadialDistribution,
+    range: RangeInclusive<u32>,
+    number: impl Fn(u32) -> f32 + Copy + Send + Sync,
+) -> ErrorReport {
+    let truth = &Truth::new(distribution);
+    let (first, count) = (*range.start(), range.end() - range.start());
+    let map_errors = measure_map(inverse, distribution, count.clamp(1, 1 << 14));
     let workers = if count > 1 << 16 { std::thread::available_parallelism().map_or(1, usize::from) as u32 } else { 1 };
     let chunk = count / workers + 1;
     let measured = std::thread::scope(|scope| {
-        let handles: Vec<_> = (0..workers)
-            .map(|w| {
-                let truth = &truth;
-                scope.spawn(move || {
-                    measure_f32(inverse, distribution, truth, count, w * chunk..=((w + 1) * chunk).min(count))
-                })
-            })
-            .collect();
+        let work = |w: u32| {
+            let numbers = (w * chunk..=((w + 1) * chunk).min(count)).map(move |k| number(first + k));
+            scope.spawn(move || measure_f32(inverse, distribution, truth, numbers))
+        };
+        let handles: Vec<_> = (0..workers).map(work).collect();
         handles
             .into_iter()
             .map(|handle| handle.join().expect("the measurement does not panic"))
@@ -137,10 +154,9 @@ fn measure_f32(
     inverse: &Inverse,
     distribution: &RadialDistribution,
     truth: &Truth,
-    count: u32,
-    range: core::ops::RangeInclusive<u32>,
+    numbers: impl Iterator<Item = f32>,
 ) -> ErrorReport {
-    let mut report = ErrorReport::empty(count);
+    let mut report = ErrorReport::empty(0);
     let scale = 1.0 + distribution.outer_ratio();
     let within_cap = |u: f64| inverse.tail().is_none_or(|tail| u <= tail.joint);
     let mut add = |u: f32| {
@@ -153,7 +169,7 @@ fn measure_f32(
     };
     // Terms that cancel do so at the end, so its neighbours are looked at one by one.
     (0..256).map(|k| (1.0 - f64::from(k) / 16_777_216.0) as f32).for_each(&mut add);
-    range.map(|k| (f64::from(k) / f64::from(count)) as f32).for_each(add);
+    numbers.for_each(add);
     report
 }
 

@@ -4,6 +4,7 @@
 mod certification;
 mod common;
 mod layers;
+mod paper_error;
 mod reference;
 mod robustness;
 mod sequences;
