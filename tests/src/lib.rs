@@ -1,1 +1,6 @@
-//! Placeholder.
+//! What the tests that span crates share: the adapter, scenes made in code, and the statistics that decide.
+
+pub mod device;
+pub mod plant;
+pub mod scenes;
+pub mod statistics;

@@ -1,0 +1,237 @@
+//! Composed kernels: every permutation validates, structures lie as the host lays them out, constants agree, and a kernel
+//! contains only what its scene needs.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::{collections::BTreeSet, sync::Arc};
+
+use fovea_tests::{device, scenes};
+use glam::Vec3;
+use naga::{
+    TypeInner,
+    valid::{Capabilities, ValidationFlags, Validator},
+};
+use tracer::{
+    features::{Feature, SceneFeatures},
+    kernels::{
+        Kernel, KernelConstants, KernelKey, ShaderSources, compose,
+        layout::{StructLayout, codes, shared_layouts},
+    },
+};
+
+fn sources() -> Arc<ShaderSources> {
+    Arc::new(ShaderSources::new(&device::inverse()))
+}
+
+fn key(kernel: Kernel, features: SceneFeatures, sources: &Arc<ShaderSources>) -> KernelKey {
+    let constants = KernelConstants { stack_size: 16, root_node: 3, environment_cells: [64, 32] };
+    KernelKey { kernel, features, constants, sources: sources.clone() }
+}
+
+/// None, each alone, each one left out, and all.
+fn permutations() -> Vec<SceneFeatures> {
+    let without =
+        |left_out: Feature| -> SceneFeatures { Feature::ALL.iter().copied().filter(|&f| f != left_out).collect() };
+    let mut sets = vec![SceneFeatures::default(), SceneFeatures::all()];
+    sets.extend(Feature::ALL.iter().map(|&feature| SceneFeatures::default().with(feature, true)));
+    sets.extend(Feature::ALL.iter().map(|&feature| without(feature)));
+    // What the paper's scenes need.
+    let room = SceneFeatures::default().with(Feature::Emission, true).with(Feature::Lights, true);
+    let glazed = room.with(Feature::Transmission, true).with(Feature::Textures, true);
+    let cloister = SceneFeatures::default()
+        .with(Feature::Lights, true)
+        .with(Feature::Textures, true)
+        .with(Feature::NormalMaps, true)
+        .with(Feature::Alpha, true);
+    sets.extend([room, room.with(Feature::Textures, true), glazed, glazed.with(Feature::Instances, true), cloister]);
+    sets.into_iter().map(closed).collect()
+}
+
+/// With what a feature never occurs without: see [`SceneFeatures::of`].
+fn closed(mut features: SceneFeatures) -> SceneFeatures {
+    for (feature, implied) in [
+        (Feature::Emission, Feature::Lights),
+        (Feature::Solid, Feature::Transmission),
+        (Feature::NormalMaps, Feature::Textures),
+        (Feature::SpecularTextures, Feature::Textures),
+    ] {
+        features = features.with(implied, features.contains(feature));
+    }
+    features
+}
+
+fn parsed_and_valid(key: &KernelKey) -> naga::Module {
+    let text = compose(key).unwrap();
+    let module =
+        naga::front::wgsl::parse_str(&text).unwrap_or_else(|error| panic!("{key}: {}", error.emit_to_string(&text)));
+    let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
+    if let Err(error) = validator.validate(&module) {
+        panic!("{key}: {}", error.emit_to_string(&text));
+    }
+    module
+}
+
+/// Compares a structure of a module with its twin on the host.
+fn assert_same(module: &naga::Module, name: &str, inner: &TypeInner, twin: &StructLayout, label: &str) {
+    let TypeInner::Struct { members, span } = inner else { panic!("{name} is no structure") };
+    let of_shader: Vec<(String, usize)> =
+        members.iter().map(|m| (m.name.clone().unwrap(), m.offset as usize)).collect();
+    let of_host: Vec<(String, usize)> = twin
+        .fields
+        .iter()
+        .filter(|(field, _)| !field.starts_with("pad"))
+        .map(|(field, offset)| (field.to_string(), *offset))
+        .collect();
+    assert_eq!(of_shader, of_host, "{name} in {label}");
+    assert_eq!(*span as usize, twin.size, "size of {name} in {label}");
+    for (_, ty) in module.types.iter() {
+        if let TypeInner::Array { base, stride, .. } = ty.inner
+            && module.types[base].name.as_deref() == Some(name)
+        {
+            assert_eq!(stride as usize, twin.size, "stride of {name} in {label}");
+        }
+    }
+}
+
+#[test]
+fn permutations_validate_and_structures_lie_as_on_the_host() {
+    let _time = device::Stopwatch::start("composing and validating");
+    let sources = sources();
+    let twins = shared_layouts();
+    let mut seen = BTreeSet::new();
+    let mut count = 0;
+    for kernel in Kernel::ALL {
+        for features in permutations() {
+            // Only the path kernels look at the scene's features, and all at the film's.
+            let scene_matters = matches!(kernel, Kernel::Trace | Kernel::Generate);
+            let film_only = SceneFeatures::default().with(Feature::PerspectiveFilm, true);
+            if !scene_matters && features != SceneFeatures::default() && features != film_only {
+                continue;
+            }
+            let key = key(kernel, features, &sources);
+            let module = parsed_and_valid(&key);
+            count += 1;
+            for (_, ty) in module.types.iter() {
+                let Some(name) = &ty.name else { continue };
+                let own = name.rsplit('_').next().unwrap();
+                if let Some(twin) = twins.iter().find(|twin| twin.name == own) {
+                    assert_same(&module, name, &ty.inner, twin, &key.to_string());
+                    seen.insert(twin.name);
+                }
+            }
+        }
+    }
+    eprintln!("{count} kernels");
+    let all: BTreeSet<_> = twins.iter().map(|twin| twin.name).collect();
+    assert_eq!(seen, all, "some shared structure occurs in no kernel");
+}
+
+/// The comparison itself notices a moved, renamed or resized field.
+#[test]
+#[should_panic(expected = "BatchParams")]
+fn a_shifted_field_is_noticed() {
+    let sources = sources();
+    let key = key(Kernel::Trace, SceneFeatures::default(), &sources);
+    let module = parsed_and_valid(&key);
+    let mut twin = shared_layouts().into_iter().find(|twin| twin.name == "BatchParams").unwrap();
+    twin.fields.last_mut().unwrap().1 += 4;
+    let (_, ty) = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some("package_types_BatchParams")).unwrap();
+    assert_same(&module, "package_types_BatchParams", &ty.inner, &twin, "BatchParams");
+}
+
+/// `const NAME: u32 = value;` of a shader module.
+fn constants(text: &str) -> Vec<(String, u32)> {
+    text.lines()
+        .filter_map(|line| {
+            let (name, value) = line.strip_prefix("const ")?.split_once(": u32 = ")?;
+            let value = value.trim_end_matches(';').trim_end_matches('u');
+            let number = value.strip_prefix("0x").map_or_else(|| value.parse(), |hex| u32::from_str_radix(hex, 16));
+            Some((name.to_string(), number.unwrap_or_else(|_| panic!("{name} is not a number: {value}"))))
+        })
+        .collect()
+}
+
+macro_rules! host {
+    ($($name:ident,)*) => { vec![$((stringify!($name).to_string(), codes::$name),)*] };
+}
+
+#[test]
+fn constants_are_those_of_the_host() {
+    let sources = sources();
+    let mut shader = constants(sources.module("types").unwrap());
+    shader.extend(constants(sources.module("view::bindings").unwrap()));
+    let host = host![
+        LAYER_FILM,
+        LAYER_SPHERE,
+        LAYER_IMAGE_PLANE,
+        LAYER_PIXEL_LIST,
+        LAYER_GAZE,
+        LAYER_GAZE_AT_EYE,
+        NONE,
+        INSTANCE_MIRRORED,
+        INSTANCE_STATIC,
+        TRIANGLE_ALPHA,
+        MATERIAL_DOUBLE_SIDED,
+        MATERIAL_ALPHA_MASK,
+        MATERIAL_ALPHA_BLEND,
+        MATERIAL_UNLIT,
+        MATERIAL_SOLID,
+        TEXTURE_SRGB,
+        TEXTURE_LINEAR_FILTER,
+        TEXTURE_UV1,
+        WRAP_REPEAT,
+        WRAP_MIRROR,
+        WRAP_CLAMP,
+        LIGHT_TRIANGLE,
+        LIGHT_POINT,
+        LIGHT_SPOT,
+        LIGHT_DIRECTIONAL,
+        VIEW_EQUIRECT,
+    ];
+    for (name, value) in &host {
+        let twin = shader.iter().find(|(other, _)| other == name);
+        assert_eq!(twin.map(|(_, v)| v), Some(value), "{name}");
+    }
+    let of_types = constants(sources.module("types").unwrap());
+    for (name, _) in of_types {
+        assert!(host.iter().any(|(other, _)| *other == name), "{name} of types.wesl has no twin on the host");
+    }
+}
+
+#[test]
+fn a_diffuse_scene_has_a_kernel_without_lights_textures_and_lobes_that_it_lacks() {
+    let gpu = device::gpu();
+    let film = tracer::film::FilmOptions::equirect(16, 8);
+    let distribution = tracer::distribution::Distribution::omnidirectional(device::inverse());
+    let renderer = device::independent(&gpu, film, 1, 4, distribution, &scenes::empty(Vec3::ONE));
+    let plain = compose(&renderer.key(Kernel::Trace)).unwrap();
+    let full = compose(&key(Kernel::Trace, SceneFeatures::all(), &sources())).unwrap();
+    // Each word must be in the kernel of everything, else its absence here would say nothing.
+    for word in [
+        "texture_2d",
+        "texture_slots",
+        "lights",
+        "environment_image",
+        "sample_light",
+        "emitter_density",
+        "is_transparent",
+        "sample_texture",
+        "fresnel_dielectric",
+        "world_from_mesh[",
+        "power_heuristic",
+    ] {
+        // Mangled names escape their underscores by a count in front.
+        assert!(full.contains(word), "the kernel of everything does not contain {word}");
+        assert!(!plain.contains(word), "the kernel of a diffuse scene contains {word}");
+    }
+    let bindings = |text: &str| text.matches("@binding(").count();
+    eprintln!(
+        "diffuse: {} lines, {} bindings; everything: {} lines, {} bindings",
+        plain.lines().count(),
+        bindings(&plain),
+        full.lines().count(),
+        bindings(&full)
+    );
+    assert!(bindings(&plain) < bindings(&full));
+    // The text says what is bound; a scene's features follow from its data.
+    assert_eq!(renderer.key(Kernel::Trace).features, SceneFeatures::default());
+}
