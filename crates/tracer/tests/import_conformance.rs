@@ -62,7 +62,7 @@ const PAPER: [(&str, usize, usize, usize); 4] = [
 fn scenes(test: &str) -> Option<PathBuf> {
     let folder = std::env::var_os("FOVEA_SCENES").map(PathBuf::from);
     if folder.is_none() {
-        eprintln!("{test} DID NOT RUN: FOVEA_SCENES is not set");
+        eprintln!("SKIP {test}: FOVEA_SCENES is not set");
     }
     folder
 }
