@@ -23,8 +23,11 @@ pub struct Screenshot {
     after: Duration,
     path: PathBuf,
     outcome: Outcome,
-    /// When the first picture came, and the time spent tracing until then.
-    since: Option<(Instant, Duration)>,
+    /// When the first picture came.
+    since: Option<Instant>,
+    /// Halfway from there to the screenshot, when shaders are compiled and rates have settled: when it was, and the time
+    /// spent tracing until then.
+    halfway: Option<(Instant, Duration)>,
     asked: bool,
     /// Frames drawn since then, when the last one was, and the longest time between two.
     frames: u32,
@@ -44,6 +47,7 @@ impl Screenshot {
             path,
             outcome,
             since: None,
+            halfway: None,
             asked: false,
             frames: 0,
             last_frame: None,
@@ -77,7 +81,10 @@ impl Screenshot {
             return;
         }
         let now = Instant::now();
-        let (since, _) = *self.since.get_or_insert((now, state.readout.traced));
+        let since = *self.since.get_or_insert(now);
+        if since.elapsed() >= self.after / 2 {
+            let _ = self.halfway.get_or_insert((now, state.readout.traced));
+        }
         self.frames += 1;
         self.longest_frame = self.longest_frame.max(self.last_frame.map_or(Duration::ZERO, |last| now - last));
         self.last_frame = Some(now);
@@ -100,15 +107,16 @@ impl Screenshot {
 
     fn figures(&self, state: &State) -> Value {
         let readout = &state.readout;
-        let (since, traced) = self.since.unwrap_or((Instant::now(), readout.traced));
-        let seconds = since.elapsed().as_secs_f64();
+        let now = Instant::now();
+        let (halfway, traced) = self.halfway.unwrap_or((now, readout.traced));
+        let tracing = readout.traced.saturating_sub(traced).as_secs_f64();
         json!({
             "samples": readout.samples,
             "samples_per_s": readout.samples_per_s,
             "spp_at_gaze": readout.spp_at_gaze,
             "elapsed_s": readout.elapsed.as_secs_f64(),
-            "tracing_share": readout.traced.saturating_sub(traced).as_secs_f64() / seconds.max(1e-9),
-            "shown_s": seconds,
+            "tracing_share": tracing / (now - halfway).as_secs_f64().max(1e-9),
+            "shown_s": self.since.map_or(0.0, |since| (now - since).as_secs_f64()),
             "frames": self.frames,
             "longest_frame_ms": self.longest_frame.as_secs_f64() * 1e3,
             "film": state.film,
