@@ -15,7 +15,7 @@
 /// | `abs(e^ - e)` | 0.0320 degrees | u = 1 | |
 /// | `abs(e^ - e) / e` | 0.221 % | 7.6 degrees | |
 /// | `abs(CDF(e^) - u)` | 0.0517 % | | |
-/// | `abs(m^ - m)`, pointwise | **2.49 %** | 5.795 degrees | 0.10 % |
+/// | `abs(m^ - m)`, pointwise | **2.49 %** | 5.795 degrees | 0.25 % |
 /// | `m^ - m`, with its sign | | | 0.033 % |
 /// | `abs(m^ - m)`, averaged over 256 bins of [0, 80] degrees | **1.78 %** | the bin of the joint | |
 ///
