@@ -38,8 +38,14 @@ fn angle_deg(a: Direction, b: Direction) -> f64 {
 }
 
 /// Samples of each pixel.
-fn counts(gpu: &Gpu, film: FilmOptions, sequence: SequenceKind, samples: u64, distribution: Distribution) -> Vec<f64> {
-    let options = RendererOptions { film, max_bounces: 0, seed: 11, sequence };
+fn counts(
+    gpu: &Gpu,
+    film: FilmOptions,
+    (sequence, seed): (SequenceKind, u32),
+    samples: u64,
+    distribution: Distribution,
+) -> Vec<f64> {
+    let options = RendererOptions { film, max_bounces: 0, seed, sequence };
     let mut renderer = Renderer::new(gpu, &options, distribution).unwrap();
     renderer.set_scene(&scenes::empty(Vec3::ONE)).unwrap();
     let snapshot = device::trace(&mut renderer, samples).unwrap();
@@ -120,7 +126,7 @@ fn foveated_over_omnidirectional_is_60_and_a_half_at_the_gaze() {
     let inverse = device::inverse();
     let share = |distribution| {
         let samples = 1 << 22;
-        let counts = counts(&gpu, film, SequenceKind::Sobol, samples, distribution);
+        let counts = counts(&gpu, film, (SequenceKind::Sobol, 11), samples, distribution);
         near.iter().map(|&pixel| counts[pixel]).sum::<f64>() / samples as f64
     };
     let omnidirectional = share(Distribution::omnidirectional(inverse.clone()));
@@ -138,10 +144,11 @@ fn eccentricity_in_the_scene_follows_the_acuity_model() {
     let twin = Film::equirectangular(256, 128).unwrap();
     let acuity = device::acuity();
     let plane = RadialDistribution::new(Reddy2001, Geometry::Plane, Angle::from_degrees(80.0), 0.002).unwrap();
-    for (yaw, pitch) in [(20.0, 10.0), (180.0, -30.0), (-100.0, 86.0)] {
+    for (yaw, pitch, seed) in [(20.0, 10.0, 101), (180.0, -30.0, 102), (-100.0, 86.0, 103)] {
         let gaze = unit(yaw, pitch);
         let distribution = Distribution::foveated(Gaze::Scene { direction: vec3(gaze) }, None, device::inverse());
-        let counts = counts(&gpu, FilmOptions::equirect(256, 128), SequenceKind::Independent, SAMPLES, distribution);
+        let counts =
+            counts(&gpu, FilmOptions::equirect(256, 128), (SequenceKind::Independent, seed), SAMPLES, distribution);
         let rings = rings(&twin, |d| angle_deg(d, gaze));
         let density = |of: &RadialDistribution, d| of.pdf(Angle::from_degrees(angle_deg(d, gaze)));
         let p =
@@ -229,7 +236,7 @@ fn a_layer_without_its_floor_ends_at_the_cap() {
     };
     let distribution = Distribution::mixture(vec![(1.0, layer)], Arc::clone(&inverse)).unwrap();
     let film = FilmOptions::equirect(128, 64);
-    let counts = counts(&gpu, film, SequenceKind::Independent, 1 << 18, distribution);
+    let counts = counts(&gpu, film, (SequenceKind::Independent, 11), 1 << 18, distribution);
     let twin = Film::equirectangular(128, 64).unwrap();
     let rings = rings(&twin, |d| angle_deg(d, gaze));
     let beyond: f64 = counts.iter().zip(&rings).filter(|(_, ring)| **ring >= 83).map(|(count, _)| count).sum();

@@ -88,7 +88,7 @@ fn textured_room(yaw_deg: f32, pitch_deg: f32) -> Case {
         max_bounces: 2,
         gaze: in_scene(&view),
         view,
-        samples: [1 << 16, 1 << 17, 3 << 16],
+        samples: [1 << 17, 1 << 18, 3 << 17],
     }
 }
 
