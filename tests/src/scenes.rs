@@ -178,3 +178,24 @@ pub fn textured_room() -> Scene {
     builder.quad(Vec3::new(-0.8, 1.75, -1.6), Vec3::X * 1.6, Vec3::Z * 1.2, lamp);
     builder.build()
 }
+
+/// Under an even sky: a checkered floor, two walls, a rough metal sphere and a Lambertian one; the origin is in the middle.
+pub fn terrace() -> Scene {
+    let mut builder = Builder::new(Vec3::new(0.8, 0.9, 1.0));
+    let texels = (0..64).map(|i| if (i % 8 + i / 8) % 2 == 0 { [200, 200, 190, 255] } else { [120, 90, 80, 255] });
+    let checkers = builder.texture(8, TexelEncoding::Srgb, texels.collect());
+    let floor = builder.material(Material { base_color_texture: Some(checkers), ..lambert(Vec3::ONE) });
+    let wall = builder.material(lambert(Vec3::new(0.7, 0.4, 0.3)));
+    let metal = builder.material(Material {
+        base_color: Vec3::new(0.9, 0.8, 0.6).extend(1.0),
+        roughness: 0.4,
+        ..Default::default()
+    });
+    builder.quad(Vec3::new(-6.0, -1.5, -6.0), Vec3::Z * 12.0, Vec3::X * 12.0, floor);
+    builder.quad(Vec3::new(-4.0, -1.5, -5.0), Vec3::X * 5.0, Vec3::Y * 4.0, wall);
+    builder.quad(Vec3::new(4.0, -1.5, 5.0), Vec3::X * -6.0, Vec3::Y * 3.0, wall);
+    let sphere = builder.sphere(24);
+    builder.place(sphere, metal, Affine3A::from_translation(Vec3::new(0.5, -0.5, 3.0)));
+    builder.place(sphere, wall, Affine3A::from_translation(Vec3::new(-3.0, -0.4, 1.0)));
+    builder.build()
+}
