@@ -175,7 +175,6 @@ fn constants_are_those_of_the_host() {
         MATERIAL_ALPHA_BLEND,
         MATERIAL_UNLIT,
         MATERIAL_SOLID,
-        TEXTURE_SRGB,
         TEXTURE_LINEAR_FILTER,
         TEXTURE_UV1,
         WRAP_REPEAT,

@@ -30,7 +30,7 @@ fn software_or_default() -> Gpu {
 
 fn points() -> Vec<[f32; 2]> {
     let corners =
-        [0.0, 2f32.powi(-24), 0.09645932, 0.09645933, 0.102951057, 0.0965, 0.5, 0.95477, 1.0 - 2f32.powi(-24), 1.0];
+        [0.0, 2f32.powi(-24), 0.09645932, 0.09645933, 0.102_951_06, 0.0965, 0.5, 0.95477, 1.0 - 2f32.powi(-24), 1.0];
     let mut all: Vec<[f32; 2]> = corners.iter().flat_map(|a| corners.map(|b| [*a, b])).collect();
     let number = |i, dimension| sequence::to_unit_f32(sequence::sobol_owen(i, dimension, 3));
     all.extend((0..(POINTS - all.len()) as u32).map(|i| [number(i, 0), number(i, 1)]));
