@@ -53,16 +53,18 @@ impl Acuity {
         )?;
         let inverse = match self.inverse {
             None => Inverse::default_for(&radial),
-            Some(form) => Inverse::with_form(&radial, form.of_sampler()).context("--inverse")?,
+            Some(form) => Inverse::with_form(&radial, form.of_sampler(geometry)).context("--inverse")?,
         };
         Ok(Arc::new(inverse))
     }
 }
 
 impl InverseForm {
-    fn of_sampler(self) -> Form {
+    /// The sampler's form. On the sphere the degree 5 is of a polynomial that is squared: 1 - cos e begins with a square.
+    pub(crate) fn of_sampler(self, geometry: fovea_sampler::Geometry) -> Form {
         match self {
             Self::Eq6 => Form::Eq6,
+            Self::Poly5 if geometry == fovea_sampler::Geometry::Sphere => Form::SquaredPolynomial(5),
             Self::Poly5 => Form::Polynomial(5),
             Self::Rational => Form::Rational(3, 3),
             Self::Table => Form::Table(64),

@@ -14,7 +14,7 @@ use fovea_sampler::{
 use tracer::gpu::{AdapterSelect, Gpu};
 
 use super::print_text;
-use crate::cli::choices;
+use crate::cli::choices::{self, InverseForm};
 use crate::cli::sampler::{Evaluated, SamplerArgs};
 use crate::output::{png, write_atomically};
 
@@ -45,12 +45,15 @@ fn evaluate(args: &SamplerArgs, file: &Path) -> anyhow::Result<()> {
     let distribution = RadialDistribution::new(model, geometry, Angle::from_degrees(args.cap), args.floor)?;
     let form = match args.inverse {
         Evaluated::Exact => None,
-        Evaluated::Eq6 => Some(Form::Eq6),
-        Evaluated::Poly5 => Some(Form::Polynomial(5)),
-        Evaluated::Rational => Some(Form::Rational(3, 3)),
-        Evaluated::Table => Some(Form::Table(256)),
+        Evaluated::Eq6 => Some(InverseForm::Eq6),
+        Evaluated::Poly5 => Some(InverseForm::Poly5),
+        Evaluated::Rational => Some(InverseForm::Rational),
+        Evaluated::Table => Some(InverseForm::Table),
     };
-    let inverse = form.map(|form| Inverse::with_form(&distribution, form)).transpose().context("--inverse")?;
+    let inverse = form
+        .map(|form| Inverse::with_form(&distribution, form.of_sampler(geometry)))
+        .transpose()
+        .context("--inverse")?;
     print_text(&report::evaluate(&distribution, inverse.as_ref(), &numbers))
 }
 
