@@ -57,7 +57,9 @@ const IMPORTS: &str = "
 import package::sampler::hash_u32;
 import package::path_bindings::{triangles, instances};
 import package::types::TRIANGLE_ALPHA;
-import package::scene::traverse::{Ray, traverse};
+import package::scene::traverse::{Ray, HitPair, RAY_ANY, RAY_CLOSEST};
+@if(ALPHA) import package::scene::alpha::trace_through;
+@if(!ALPHA) import package::scene::traverse::traverse_pair;
 import package::scene::surface::part_of;";
 
 const ITEMS: &str = "
@@ -76,8 +78,17 @@ const BODY: &str = "
     if index % 16u == 2u {
         direction = vec3f(0.0, 0.0, -0.5);
     }
-    let hit = traverse(Ray(origin, direction, 3.0e38), false, 1u);
-    let any = traverse(Ray(origin, direction, 3.0e38), true, 1u);
+    var hits: HitPair;
+    let for_any = Ray(origin, direction, 0.0, 3.0e38, RAY_ANY);
+    let for_closest = Ray(origin, direction, 0.0, 3.0e38, RAY_CLOSEST);
+    @if(ALPHA) {
+        hits = trace_through(for_any, for_closest, 1u);
+    }
+    @if(!ALPHA) {
+        hits = traverse_pair(for_any, for_closest);
+    }
+    let any = hits.first;
+    let hit = hits.second;
     if hit.instance != NONE {
         let number = triangles[hit.triangle].w & ~TRIANGLE_ALPHA;
         let source = instances[part_of(hit.instance, triangles[hit.triangle].x)].material;

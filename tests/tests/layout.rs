@@ -213,7 +213,7 @@ fn a_diffuse_scene_has_a_kernel_without_lights_textures_and_lobes_that_it_lacks(
         "sample_light",
         "emitter_density",
         "is_transparent",
-        "sample_texture",
+        "sample_color",
         "fresnel_dielectric",
         "world_from_mesh[",
         "power_heuristic",

@@ -248,13 +248,13 @@ fn a_density_wrong_by_2_percent_in_one_layer_is_noticed() {
             "path::trace",
             &[
                 (
-                    "let pixel = choose_pixel(next_random_2(&random), random);",
-                    "let first = next_random_2(&random);\n    let pixel = choose_pixel(first, random);",
+                    "path.pixel = choose_pixel(next_random_2(&random), random);",
+                    "let first = next_random_2(&random);\n    path.pixel = choose_pixel(first, random);",
                 ),
                 (
-                    "records[invocation] = SampleRecord(radiance, pixel,",
-                    "radiance *= select(1.0, 1.02, batch.layer_count > 1u && first.x < batch.layers[0].cumulative);
-    records[invocation] = SampleRecord(radiance, pixel,",
+                    "path.throughput = vec3f(1.0);",
+                    "let is_first = batch.layer_count > 1u && first.x < batch.layers[0].cumulative;
+    path.throughput = vec3f(select(1.0, 1.02, is_first));",
                 ),
             ],
         )
@@ -273,16 +273,16 @@ fn a_position_drawn_by_the_density_is_noticed() {
             "path::trace",
             &[
                 (
-                    "let pixel = choose_pixel(next_random_2(&random), random);",
-                    "let first = next_random_2(&random);\n    let pixel = choose_pixel(first, random);",
+                    "path.pixel = choose_pixel(next_random_2(&random), random);",
+                    "let first = next_random_2(&random);\n    path.pixel = choose_pixel(first, random);",
                 ),
                 (
                     "import package::sampling::distribution::choose_pixel;",
                     "import package::sampling::distribution::{choose_pixel, layer_direction};",
                 ),
                 (
-                    "var direction = batch.world_from_film * direction_of_film(corner + place);",
-                    "var direction = layer_direction(0u, first);",
+                    "let direction = batch.world_from_film * direction_of_film(corner + place);",
+                    "let direction = layer_direction(0u, first);",
                 ),
             ],
         )

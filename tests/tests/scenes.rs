@@ -139,11 +139,11 @@ fn an_emissive_rectangle_by_each_way_of_sampling() {
         [(0.5, 1.0), (1.5, 1.0), (0.5, 2.0), (1.5, 2.0)].iter().map(|&(a, b)| corner_form_factor(a, b, 1.5)).sum();
     let expected = 0.7 * 3.0 * factor;
     assert_is("both", measure(&gpu, &scene, ray, 1, Clone::clone), expected);
-    let hit = "weight = power_heuristic(density, light_density * (1.0 - batch.environment_probability));";
+    let hit = "weight = power_heuristic((*path).density, light_density * (1.0 - batch.environment_probability));";
     let bsdf_only = |sources: &ShaderSources| {
         exchanged(
             sources,
-            "path::trace",
+            "path::shade",
             &[
                 (hit, "weight = select(1.0, 1.0, light_density > 0.0);"),
                 ("var contribution = f.value * weight;", "var contribution = vec3f(0.0);"),
@@ -154,7 +154,7 @@ fn an_emissive_rectangle_by_each_way_of_sampling() {
     let light_only = |sources: &ShaderSources| {
         exchanged(
             sources,
-            "path::trace",
+            "path::shade",
             &[
                 (hit, "weight = select(0.0, 0.0, light_density > 0.0);"),
                 ("contribution *= power_heuristic(density, f.density);", "contribution *= 1.0;"),
