@@ -6,14 +6,8 @@ use super::glb::Builder;
 use super::{paint, pattern};
 
 /// What the materials below use.
-pub(super) const EXTENSIONS: [&str; 6] = [
-    "KHR_materials_clearcoat",
-    "KHR_materials_emissive_strength",
-    "KHR_materials_ior",
-    "KHR_materials_sheen",
-    "KHR_materials_transmission",
-    "KHR_materials_volume",
-];
+pub(super) const EXTENSIONS: [&str; 4] =
+    ["KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_transmission", "KHR_materials_volume"];
 
 /// Indices of all materials.
 pub(super) struct Palette {
@@ -84,8 +78,10 @@ fn double_sided(mut material: Value) -> Value {
     material
 }
 
-fn coated(material: Value, roughness: f64) -> Value {
-    with(material, "KHR_materials_clearcoat", json!({"clearcoatFactor": 1.0, "clearcoatRoughnessFactor": roughness}))
+/// Glazed, waxed or varnished: the surface is as smooth as its finish.
+fn coated(mut material: Value, roughness: f64) -> Value {
+    material["pbrMetallicRoughness"]["roughnessFactor"] = json!(roughness);
+    material
 }
 
 fn solid_glass(ior: f64, attenuation: [f64; 3], distance: f64) -> Value {
@@ -102,9 +98,8 @@ fn emitter(color: [f64; 3], radiance: f64) -> Value {
     with(material, "KHR_materials_emissive_strength", json!({"emissiveStrength": radiance}))
 }
 
-fn cloth(color: [f64; 3], sheen: [f64; 3]) -> Value {
-    let sheen = json!({"sheenColorFactor": sheen, "sheenRoughnessFactor": 0.4});
-    with(double_sided(diffuse(color, 0.95)), "KHR_materials_sheen", sheen)
+fn cloth(color: [f64; 3]) -> Value {
+    double_sided(diffuse(color, 0.95))
 }
 
 impl Palette {
@@ -150,8 +145,8 @@ impl Palette {
             eye_chart: b.material("eye chart", textured(chart, 0.8)),
             landscape: b.material("landscape", sky),
             paper: b.material("paper", diffuse([0.80, 0.77, 0.68], 0.9)),
-            curtain: b.material("curtain", cloth([0.62, 0.50, 0.34], [0.3, 0.26, 0.2])),
-            armchair: b.material("armchair", cloth([0.10, 0.20, 0.24], [0.25, 0.35, 0.4])),
+            curtain: b.material("curtain", cloth([0.62, 0.50, 0.34])),
+            armchair: b.material("armchair", cloth([0.10, 0.20, 0.24])),
             leaf: b.material("leaf", double_sided(diffuse([0.10, 0.26, 0.06], 0.5))),
             soil: b.material("soil", diffuse([0.07, 0.05, 0.04], 1.0)),
             clay: b.material("clay", diffuse([0.52, 0.26, 0.16], 0.85)),
