@@ -186,9 +186,13 @@ pub fn triangles(scene: &Scene) -> u64 {
         .sum()
 }
 
-/// An error with its causes as one line.
+/// An error with its causes as one line; a cause that the text before it ends with already is not said twice.
 pub fn one_line(error: &anyhow::Error) -> String {
-    let text = format!("{error:#}");
+    let text = error.chain().map(ToString::to_string).fold(String::new(), |text, cause| match text.as_str() {
+        "" => cause,
+        before if before.ends_with(&cause) => text,
+        before => format!("{before}: {cause}"),
+    });
     text.split(['\n', '\r']).map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join("; ")
 }
 
@@ -200,6 +204,13 @@ mod tests {
 
     use super::*;
     use crate::view::View;
+
+    #[test]
+    fn a_cause_is_said_once() {
+        let cause = || std::io::Error::other("gone");
+        assert_eq!(one_line(&anyhow::Error::from(cause()).context("a.glb")), "a.glb: gone");
+        assert_eq!(one_line(&anyhow::Error::from(cause()).context("a.glb: gone")), "a.glb: gone");
+    }
 
     /// A triangle in the unit cube's corner, moved by 10 m and made twice as large, and a hidden one far away.
     fn scene() -> Scene {
