@@ -6,12 +6,13 @@
 use std::{sync::Arc, time::Duration};
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use fovea_benches::{one_triangle, print_machine};
+use fovea_benches::one_triangle;
 use fovea_sampler::{Angle, Geometry, Inverse, RadialDistribution, Reddy2001, report};
 use glam::{Quat, Vec3};
 use tracer::{
     distribution::{Distribution, Gaze, View},
     gpu::{AdapterSelect, Gpu},
+    provenance::Provenance,
     renderer::{Renderer, RendererOptions},
 };
 
@@ -20,7 +21,7 @@ const RAYS: u32 = 65_536;
 
 fn launch(criterion: &mut Criterion) {
     let gpu = Gpu::headless(&AdapterSelect::Auto).expect("an adapter");
-    print_machine(&gpu);
+    eprint!("{}", Provenance::on(&gpu));
     let cap = Angle::from_degrees(80.0);
     let default = |floor| RadialDistribution::new(Reddy2001, Geometry::Sphere, cap, floor).expect("valid constants");
     let inverse = Arc::new(Inverse::default_for(&default(0.002)));
@@ -33,7 +34,7 @@ fn launch(criterion: &mut Criterion) {
     ];
     for geometry in Geometry::ALL {
         let distribution = RadialDistribution::new(Reddy2001, geometry, cap, 0.0).expect("valid constants");
-        for form in report::forms(geometry) {
+        for form in report::forms(geometry).into_iter().filter(|form| form.suits_shaders()) {
             let inverse = Inverse::with_form(&distribution, form).expect("a form of the report");
             let name = format!("FV {} {}", geometry.name(), form.name());
             modes.push((name, Distribution::foveated(gaze, None, Arc::new(inverse))));

@@ -7,7 +7,6 @@
 
 use std::{path::Path, process::ExitCode, sync::Arc, time::Instant};
 
-use fovea_benches::machine;
 use fovea_sampler::{Angle, Geometry, Inverse, RadialDistribution, Reddy2001};
 use glam::{Quat, Vec3};
 use serde_json::{Value, json};
@@ -16,6 +15,7 @@ use tracer::{
     distribution::{Distribution, Gaze, View},
     gpu::{AdapterSelect, Gpu},
     import::{ImportOptions, load_gltf},
+    provenance::Provenance,
     renderer::{FIRST_BATCH, FilmPose, Renderer, RendererOptions, StopCondition},
     scene::{Environment, Scene},
     view::{DebugView, ToneMap, ViewProjection, ViewSettings},
@@ -44,7 +44,9 @@ fn run(args: &[String]) -> Result<(), AnyError> {
     for file in files {
         rows.push(measure(&gpu, Some(Path::new(file)), seconds)?);
     }
-    let machine: serde_json::Map<_, _> = machine(&gpu).into_iter().map(|(k, v)| (k.to_string(), v.into())).collect();
+    let provenance = Provenance::on(&gpu);
+    let machine: serde_json::Map<_, _> =
+        provenance.fields().into_iter().map(|(name, value)| (name.into(), value.into())).collect();
     let raw = json!({ "machine": machine, "seconds_per_mode": seconds, "scenes": rows });
     std::fs::create_dir_all(out)?;
     std::fs::write(Path::new(out).join("scenes.json"), format!("{raw:#}\n"))?;

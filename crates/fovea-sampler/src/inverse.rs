@@ -3,10 +3,12 @@
 mod build;
 mod certify;
 mod form;
+mod lanes;
 
 use crate::{Angle, Geometry, RadialDistribution, SamplerError, trig};
 pub use certify::{ErrorBound, ErrorReport};
 pub(crate) use form::{Argument, Core, Outer, Piece};
+pub(crate) use lanes::{LANES, Lanes, map2};
 
 /// The largest relative error in eccentricity, in f32 arithmetic, that a fit may have.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
@@ -130,6 +132,26 @@ impl Inverse {
         }
     }
 
+    /// [`Self::eval_versine`] of every lane, bit for bit.
+    pub(crate) fn eval_versine_lanes(&self, u: &Lanes) -> Lanes {
+        let u = lanes::map(u, unit_interval);
+        let (last, others) = self.pieces.split_last().expect("an inverse has at least one piece");
+        let mut radius = last.eval_lanes(&u);
+        for piece in others.iter().rev() {
+            for ((radius, value), u) in radius.iter_mut().zip(piece.eval_lanes(&u)).zip(&u) {
+                *radius = if *u <= piece.end { value } else { *radius };
+            }
+        }
+        let versine = match self.geometry {
+            Geometry::Sphere => radius,
+            Geometry::Plane => lanes::map(&radius, trig::versine),
+        };
+        match self.tail {
+            None => versine,
+            Some(tail) => map2(&versine, &u, |v, u| if u > tail.start { 2.0 - (1.0 - u) * tail.slope } else { v }),
+        }
+    }
+
     #[inline]
     fn tail_versine(&self, u: f32) -> Option<f32> {
         self.tail.filter(|tail| u > tail.start).map(|tail| 2.0 - (1.0 - u) * tail.slope)
@@ -245,6 +267,13 @@ pub enum Form {
 }
 
 impl Form {
+    /// Whether its WGSL compiles in reasonable time everywhere: a table is a constant array there, and above 64 cells a
+    /// software adapter takes minutes over it.
+    #[must_use]
+    pub fn suits_shaders(self) -> bool {
+        !matches!(self, Self::Table(cells) if cells > 64)
+    }
+
     /// Name for reports and the command line.
     #[must_use]
     pub fn name(self) -> String {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::frame::{Direction, gaze_frame, gaze_frame_f32};
-use crate::inverse::unit_interval;
+use crate::inverse::{LANES, Lanes, unit_interval};
 use crate::{Angle, Eccentricity, Geometry, Inverse, RadialDistribution, trig};
 
 /// Directions about a gaze direction, distributed by an [`Inverse`]: the first number chooses the radius, the second the
@@ -86,10 +86,22 @@ impl GazeWarp {
     #[inline]
     #[must_use]
     pub fn sample_local_f32(&self, u: [f32; 2]) -> [f32; 3] {
-        let v = self.inverse.eval_versine(u[0]);
-        let sine = (v * (2.0 - v)).max(0.0).sqrt();
-        let [cos, sin] = trig::cos_sin_turn(unit_interval(u[1]));
-        [sine * cos, sine * sin, 1.0 - v]
+        local_direction(self.inverse.eval_versine(u[0]), u[1])
+    }
+
+    /// [`Self::sample_local_f32`] of many numbers, bit for bit, at a fraction of its cost: the inverse's form is chosen once
+    /// for a block of them. As many as the shorter slice has.
+    pub fn sample_local_batch(&self, numbers: &[[f32; 2]], directions: &mut [[f32; 3]]) {
+        for (numbers, directions) in numbers.chunks(LANES).zip(directions.chunks_mut(LANES)) {
+            let mut u: Lanes = [0.0; LANES];
+            for (u, number) in u.iter_mut().zip(numbers) {
+                *u = number[0];
+            }
+            let v = self.inverse.eval_versine_lanes(&u);
+            for ((direction, number), v) in directions.iter_mut().zip(numbers).zip(v) {
+                *direction = local_direction(v, number[1]);
+            }
+        }
     }
 
     /// The shader's arithmetic: the direction in world space.
@@ -132,6 +144,13 @@ impl GazeWarp {
             Geometry::Plane => Angle::from_versine(v).radians(),
         }
     }
+}
+
+#[inline]
+fn local_direction(versine: f32, turns: f32) -> [f32; 3] {
+    let sine = (versine * (2.0 - versine)).max(0.0).sqrt();
+    let [cos, sin] = trig::cos_sin_turn(unit_interval(turns));
+    [sine * cos, sine * sin, 1.0 - versine]
 }
 
 /// `1 - cos` of the angle between unit vectors, as `|a - b|^2 / 2`: accurate near zero.

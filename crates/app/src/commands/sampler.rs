@@ -9,9 +9,12 @@ use std::path::Path;
 use anyhow::Context;
 use fovea_sampler::report::{self, Chart, Entry, Provenance};
 use fovea_sampler::{
-    AcuityModel, Angle, Form, GazeWarp, Geometry, Inverse, RadialDistribution, Reddy2001, TabulatedAcuity, model,
+    AcuityModel, Angle, GazeWarp, Geometry, Inverse, RadialDistribution, Reddy2001, TabulatedAcuity, model,
 };
-use tracer::gpu::{AdapterSelect, Gpu};
+use tracer::{
+    gpu::{AdapterSelect, Gpu},
+    provenance,
+};
 
 use super::print_text;
 use crate::cli::choices::{self, InverseForm};
@@ -64,14 +67,9 @@ fn read(path: &Path) -> anyhow::Result<String> {
 fn compare(args: &SamplerArgs) -> anyhow::Result<()> {
     std::fs::create_dir_all(&args.output).with_context(|| format!("{} cannot be made", args.output.display()))?;
     let gpu = if args.cpu_only { Err("left out".to_owned()) } else { gpu(args.adapter.as_deref())? };
-    let provenance = Provenance {
-        machine: cost::machine(),
-        adapter: gpu.as_ref().map_or_else(Clone::clone, |gpu| {
-            let info = gpu.info();
-            format!("{} ({}, {})", info.name, info.backend, info.driver_info)
-        }),
-        commit: cost::commit(),
-    };
+    let provenance =
+        gpu.as_ref().map_or_else(|reason| provenance::Provenance::without_gpu(reason), provenance::Provenance::on);
+    let provenance = Provenance { machine: provenance.machine, adapter: provenance.adapter, commit: provenance.commit };
     let baselines = cost::Baselines::measure();
     let rays = gpu.as_ref().ok().map(adapter::Rays::new);
     let mut entries = Vec::new();
@@ -87,7 +85,7 @@ fn compare(args: &SamplerArgs) -> anyhow::Result<()> {
                 cpu_ns: cost::direction_ns(&warp),
                 gpu_ms: rays
                     .as_ref()
-                    .filter(|_| compiles_anywhere(form))
+                    .filter(|_| form.suits_shaders())
                     .map(|rays| rays.foveated_ms(warp.inverse()))
                     .transpose()?,
             });
@@ -107,11 +105,6 @@ fn compare(args: &SamplerArgs) -> anyhow::Result<()> {
     let ([width, height], texels) = raster::draw(&chart);
     png::write(&args.output.join("sampler.png"), width, height, &texels)?;
     print_text(&format!("wrote sampler.csv, sampler.svg and sampler.png to {}\n", args.output.display()))
-}
-
-/// Large constant arrays take software adapters minutes to compile.
-fn compiles_anywhere(form: Form) -> bool {
-    !matches!(form, Form::Table(cells) if cells > 64)
 }
 
 /// The adapter, or why there is none; a name that matches nothing is an error.

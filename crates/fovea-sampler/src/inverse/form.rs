@@ -48,6 +48,22 @@ pub(crate) struct Piece {
     pub(crate) outer: Outer,
 }
 
+impl Core {
+    /// In f32, operation by operation as the shader's text.
+    #[inline]
+    pub(crate) fn eval(&self, t: f32) -> f32 {
+        match self {
+            Self::Polynomial(coefficients) => horner(coefficients, t),
+            Self::Rational { numerator, denominator } => horner(numerator, t) / horner(denominator, t),
+            Self::Table { per_unit, first, cells } => {
+                let position = t * per_unit;
+                let cell = (position as u32).clamp(*first, first + cells.len() as u32 - 1);
+                horner(&cells[(cell - first) as usize], position - cell as f32)
+            }
+        }
+    }
+}
+
 impl Piece {
     /// The same piece of `scale` times its argument: takes a fit in `U = u scale` to `u`.
     pub(crate) fn rescaled(self, scale: f64) -> Self {
@@ -88,16 +104,7 @@ impl Piece {
             Argument::U => u,
             Argument::SqrtU => u.sqrt(),
         };
-        let t = argument - self.origin;
-        let c = match &self.core {
-            Core::Polynomial(coefficients) => horner(coefficients, t),
-            Core::Rational { numerator, denominator } => horner(numerator, t) / horner(denominator, t),
-            Core::Table { per_unit, first, cells } => {
-                let position = t * per_unit;
-                let cell = (position as u32).clamp(*first, first + cells.len() as u32 - 1);
-                horner(&cells[(cell - first) as usize], position - cell as f32)
-            }
-        };
+        let c = self.core.eval(argument - self.origin);
         match self.outer {
             Outer::Identity => c,
             Outer::Square => c * c,

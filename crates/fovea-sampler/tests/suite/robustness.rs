@@ -175,3 +175,29 @@ const PINNED_RADII: [[u32; 9]; 4] = [
 ];
 const PINNED_SEQUENCE: [u32; 8] =
     [0x3370_ce92, 0x1b69_032f, 0x7c8c_7209, 0x0ef1_c1c8, 0x5618_864d, 0x5f36_415e, 0x937d_591d, 0x76c8_5ca7];
+
+/// A batch is the single draws, bit for bit: whole blocks, a part of one, and slices of unequal length.
+#[test]
+fn batches_equal_single_draws() {
+    for (name, distribution) in distributions() {
+        let piecewise = [Form::Piecewise(4, 3), Form::Polynomial(2), Form::Table(64)];
+        let more = piecewise.iter().filter_map(|form| Inverse::with_form(&distribution, *form).ok());
+        for inverse in inverses(&distribution).into_iter().chain(more) {
+            let drawn = (0..300).map(|i| uniform(i, 0, 9));
+            let bad_numbers = [f32::NAN, -1.0, 2.0, f32::INFINITY, f32::NEG_INFINITY];
+            let numbers = adversarial_u(&inverse, &distribution).into_iter().chain(bad_numbers).chain(drawn);
+            let first: Vec<f32> = numbers.collect();
+            let pairs: Vec<[f32; 2]> = first.iter().zip(first.iter().rev()).map(|(u, v)| [*u, *v]).collect();
+            let warp = GazeWarp::with_inverse(distribution.clone(), inverse);
+            let mut batch = vec![[7.0; 3]; pairs.len() - 3];
+            warp.sample_local_batch(&pairs, &mut batch);
+            for (u, found) in pairs.iter().zip(&batch) {
+                let single = warp.sample_local_f32(*u);
+                assert_eq!(found.map(f32::to_bits), single.map(f32::to_bits), "{name} {} {u:?}", warp.inverse().name());
+            }
+            let mut longer = vec![[7.0; 3]; pairs.len() + 1];
+            warp.sample_local_batch(&pairs, &mut longer);
+            assert_eq!(longer[pairs.len()], [7.0; 3], "nothing is written beyond the numbers");
+        }
+    }
+}
