@@ -6,7 +6,9 @@
 use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use fovea_sampler::{Angle, GazeWarp, Geometry, Inverse, RadialDistribution, Reddy2001, report, sequence, trig};
+use fovea_sampler::{
+    Angle, GazeWarp, Geometry, Inverse, RadialDistribution, Reddy2001, report, sequence, trig, uniform_disc_batch,
+};
 use tracer::{
     gpu::{AdapterSelect, Gpu},
     provenance::Provenance,
@@ -73,9 +75,7 @@ fn in_a_batch(criterion: &mut Criterion, numbers: &[[f32; 2]]) {
     let mut directions = vec![[0.0; 3]; numbers.len()];
     group.bench_function("uniform disc", |bencher| {
         bencher.iter(|| {
-            for (direction, u) in directions.iter_mut().zip(black_box(numbers)) {
-                *direction = uniform_disc(*u);
-            }
+            uniform_disc_batch(black_box(numbers), &mut directions);
             black_box(&mut directions);
         });
     });

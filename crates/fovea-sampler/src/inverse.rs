@@ -3,12 +3,11 @@
 mod build;
 mod certify;
 mod form;
-mod lanes;
+pub(crate) mod lanes;
 
 use crate::{Angle, Geometry, RadialDistribution, SamplerError, trig};
 pub use certify::{ErrorBound, ErrorReport};
 pub(crate) use form::{Argument, Core, Outer, Piece};
-pub(crate) use lanes::{LANES, Lanes, map2};
 
 /// The largest relative error in eccentricity, in f32 arithmetic, that a fit may have.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
@@ -133,7 +132,7 @@ impl Inverse {
     }
 
     /// [`Self::eval_versine`] of every lane, bit for bit.
-    pub(crate) fn eval_versine_lanes(&self, u: &Lanes) -> Lanes {
+    pub(crate) fn eval_versine_lanes(&self, u: &lanes::Lanes) -> lanes::Lanes {
         let u = lanes::map(u, unit_interval);
         let (last, others) = self.pieces.split_last().expect("an inverse has at least one piece");
         let mut radius = last.eval_lanes(&u);
@@ -148,7 +147,9 @@ impl Inverse {
         };
         match self.tail {
             None => versine,
-            Some(tail) => map2(&versine, &u, |v, u| if u > tail.start { 2.0 - (1.0 - u) * tail.slope } else { v }),
+            Some(tail) => {
+                lanes::map2(&versine, &u, |v, u| if u > tail.start { 2.0 - (1.0 - u) * tail.slope } else { v })
+            }
         }
     }
 

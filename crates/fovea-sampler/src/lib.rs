@@ -72,7 +72,7 @@ pub use model::{
     AcuityModel, GeislerPerry1998, LinearFalloff, LinearMar, Reddy2001, ReddySquared, StaticDisc, TabulatedAcuity,
 };
 pub use radial::{Geometry, RadialDistribution};
-pub use warp::{GazeWarp, WarpSample};
+pub use warp::{GazeWarp, WarpSample, uniform_disc_batch};
 
 /// Compiles the README's example.
 #[cfg(doctest)]

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use crate::frame::{Direction, gaze_frame, gaze_frame_f32};
-use crate::inverse::{LANES, Lanes, unit_interval};
+use crate::inverse::lanes::{self, LANES, Lanes, map2};
+use crate::inverse::unit_interval;
 use crate::{Angle, Eccentricity, Geometry, Inverse, RadialDistribution, trig};
 
 /// Directions about a gaze direction, distributed by an [`Inverse`]: the first number chooses the radius, the second the
@@ -92,16 +93,12 @@ impl GazeWarp {
     /// [`Self::sample_local_f32`] of many numbers, bit for bit, at a fraction of its cost: the inverse's form is chosen once
     /// for a block of them. As many as the shorter slice has.
     pub fn sample_local_batch(&self, numbers: &[[f32; 2]], directions: &mut [[f32; 3]]) {
-        for (numbers, directions) in numbers.chunks(LANES).zip(directions.chunks_mut(LANES)) {
-            let mut u: Lanes = [0.0; LANES];
-            for (u, number) in u.iter_mut().zip(numbers) {
-                *u = number[0];
-            }
-            let v = self.inverse.eval_versine_lanes(&u);
-            for ((direction, number), v) in directions.iter_mut().zip(numbers).zip(v) {
-                *direction = local_direction(v, number[1]);
-            }
-        }
+        for_each_block(numbers, directions, |u, turns| {
+            let v = self.inverse.eval_versine_lanes(u);
+            let sine = lanes::map(&v, polar_sine);
+            let [cos, sin] = cos_sin_lanes(turns);
+            [map2(&sine, &cos, |s, c| s * c), map2(&sine, &sin, |s, c| s * c), lanes::map(&v, |v| 1.0 - v)]
+        });
     }
 
     /// The shader's arithmetic: the direction in world space.
@@ -148,9 +145,46 @@ impl GazeWarp {
 
 #[inline]
 fn local_direction(versine: f32, turns: f32) -> [f32; 3] {
-    let sine = (versine * (2.0 - versine)).max(0.0).sqrt();
+    let sine = polar_sine(versine);
     let [cos, sin] = trig::cos_sin_turn(unit_interval(turns));
     [sine * cos, sine * sin, 1.0 - versine]
+}
+
+#[inline]
+fn polar_sine(versine: f32) -> f32 {
+    (versine * (2.0 - versine)).max(0.0).sqrt()
+}
+
+/// Points of the unit disc, uniform by area, with `z = 0`: what a warp's cost is measured against, in the same blocks.
+pub fn uniform_disc_batch(numbers: &[[f32; 2]], points: &mut [[f32; 3]]) {
+    for_each_block(numbers, points, |u, turns| {
+        let radius = lanes::map(u, |u| unit_interval(u).sqrt());
+        let [cos, sin] = cos_sin_lanes(turns);
+        [map2(&radius, &cos, |r, c| r * c), map2(&radius, &sin, |r, s| r * s), [0.0; LANES]]
+    });
+}
+
+fn cos_sin_lanes(turns: &Lanes) -> [Lanes; 2] {
+    let [mut cos, mut sin] = [[0.0; LANES]; 2];
+    for ((turns, cos), sin) in turns.iter().zip(&mut cos).zip(&mut sin) {
+        [*cos, *sin] = trig::cos_sin_turn(unit_interval(*turns));
+    }
+    [cos, sin]
+}
+
+#[inline]
+fn for_each_block(numbers: &[[f32; 2]], out: &mut [[f32; 3]], block: impl Fn(&Lanes, &Lanes) -> [Lanes; 3]) {
+    for (numbers, out) in numbers.chunks(LANES).zip(out.chunks_mut(LANES)) {
+        let [mut u, mut turns] = [[0.0; LANES]; 2];
+        for ((number, u), turns) in numbers.iter().zip(&mut u).zip(&mut turns) {
+            [*u, *turns] = *number;
+        }
+        let [x, y, z] = block(&u, &turns);
+        let xyz = x.iter().zip(&y).zip(&z).take(numbers.len());
+        for (out, ((x, y), z)) in out.iter_mut().zip(xyz) {
+            *out = [*x, *y, *z];
+        }
+    }
 }
 
 /// `1 - cos` of the angle between unit vectors, as `|a - b|^2 / 2`: accurate near zero.

@@ -5,7 +5,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use fovea_sampler::report::Entry;
-use fovea_sampler::{GazeWarp, Geometry, RadialDistribution, sequence, trig};
+use fovea_sampler::{GazeWarp, Geometry, RadialDistribution, sequence, uniform_disc_batch};
 
 /// Directions a run; the numbers fit the second-level cache.
 const DRAWS: u32 = 1 << 15;
@@ -22,11 +22,7 @@ impl Baselines {
         let mut directions = vec![[0.0; 3]; DRAWS as usize];
         Self {
             disc_ns: fastest_ns(DRAWS, &numbers(DRAWS), |numbers| {
-                for (direction, [u, v]) in directions.iter_mut().zip(numbers) {
-                    let radius = u.sqrt();
-                    let [cos, sin] = trig::cos_sin_turn(*v);
-                    *direction = [radius * cos, radius * sin, 0.0];
-                }
+                uniform_disc_batch(numbers, &mut directions);
                 black_box(&mut directions);
             }),
         }
