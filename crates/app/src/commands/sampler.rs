@@ -70,33 +70,40 @@ fn compare(args: &SamplerArgs) -> anyhow::Result<()> {
     let provenance =
         gpu.as_ref().map_or_else(|reason| provenance::Provenance::without_gpu(reason), provenance::Provenance::on);
     let provenance = Provenance { machine: provenance.machine, adapter: provenance.adapter, commit: provenance.commit };
-    let baselines = cost::Baselines::measure();
-    let rays = gpu.as_ref().ok().map(adapter::Rays::new);
-    let mut entries = Vec::new();
+    let cap = Angle::from_degrees(80.0);
+    let mut candidates = Vec::new();
     for geometry in Geometry::ALL {
-        let distribution = RadialDistribution::new(Reddy2001, geometry, Angle::from_degrees(80.0), 0.0)?;
+        let distribution = RadialDistribution::new(Reddy2001, geometry, cap, 0.0)?;
         for form in report::forms(geometry) {
             let inverse = Inverse::with_form(&distribution, form)?;
-            let warp = GazeWarp::with_inverse(distribution.clone(), inverse);
-            entries.push(Entry {
-                geometry,
-                name: form.name(),
-                errors: Some(warp.inverse().measure(&distribution, MEASURED)),
-                cpu_ns: cost::direction_ns(&warp),
-                gpu_ms: rays
-                    .as_ref()
-                    .filter(|_| form.suits_shaders())
-                    .map(|rays| rays.foveated_ms(warp.inverse()))
-                    .transpose()?,
-            });
+            candidates.push((form, GazeWarp::with_inverse(distribution.clone(), inverse)));
         }
-        let cpu_ns = cost::exact_ns(&distribution);
+    }
+    let warps: Vec<GazeWarp> = candidates.iter().map(|(_, warp)| warp.clone()).collect();
+    let costs = cost::Costs::measure(&warps);
+    let launched: Vec<&Inverse> =
+        candidates.iter().filter(|(form, _)| form.suits_shaders()).map(|(_, warp)| warp.inverse()).collect();
+    let launches = gpu.as_ref().ok().map(|gpu| adapter::Launches::measure(gpu, &launched)).transpose()?;
+    let mut launched_ms = launches.iter().flat_map(|launches| launches.foveated_ms.iter().copied());
+    let mut entries: Vec<Entry> = candidates
+        .iter()
+        .zip(&costs.warps_ns)
+        .map(|((form, warp), &cpu_ns)| Entry {
+            geometry: warp.inverse().geometry(),
+            name: form.name(),
+            errors: Some(warp.inverse().measure(warp.distribution(), MEASURED)),
+            cpu_ns,
+            gpu_ms: form.suits_shaders().then(|| launched_ms.next()).flatten(),
+        })
+        .collect();
+    for geometry in Geometry::ALL {
+        let cpu_ns = cost::exact_ns(&RadialDistribution::new(Reddy2001, geometry, cap, 0.0)?);
         entries.push(Entry { geometry, name: "exact".into(), errors: None, cpu_ns, gpu_ms: None });
     }
     let mut text = report::table(&entries, &provenance);
-    text.push_str(&baselines.text(&entries));
-    if let Some(rays) = &rays {
-        text.push_str(&rays.uniform_text(&entries)?);
+    text.push_str(&costs.text(&entries));
+    if let Some(launches) = &launches {
+        text.push_str(&launches.text(&entries));
     }
     print_text(&text)?;
     let chart = Chart::error_against_cost(&entries, &provenance);

@@ -8,9 +8,10 @@ use fovea_sampler::report::Entry;
 use fovea_sampler::{Inverse, wgsl};
 use tracer::gpu::Gpu;
 
-/// Rays a launch, and how many launches are timed, of which the fastest counts; one more before them, which may compile, is
-/// not timed.
-const LAUNCHES: [(u32, u32); 2] = [(1 << 16, 9), (1 << 24, 2)];
+/// Rays a launch, and launches in a round.
+const LAUNCHES: [(u32, u32); 2] = [(1 << 16, 10), (1 << 24, 1)];
+/// Rounds over all inverses, of which the fastest launch counts; one more before them, which may compile, is not timed.
+const ROUNDS: u32 = 5;
 const WORKGROUP: u32 = 64;
 /// Workgroups in a row of the dispatch: below every adapter's limit.
 const ROW: u32 = 1 << 15;
@@ -41,24 +42,39 @@ fn ray(u: vec2<f32>) -> vec3<f32> {
 }
 ";
 
-/// An adapter to time on.
-pub(super) struct Rays<'a> {
-    gpu: &'a Gpu,
+/// Milliseconds a launch of 2^16 and of 2^24 rays.
+pub(super) struct Launches {
+    /// In the order of the inverses.
+    pub(super) foveated_ms: Vec<[f64; 2]>,
+    uniform_ms: [f64; 2],
+    on_software: bool,
 }
 
-impl<'a> Rays<'a> {
-    pub(super) fn new(gpu: &'a Gpu) -> Self {
-        Self { gpu }
+impl Launches {
+    pub(super) fn measure(gpu: &Gpu, inverses: &[&Inverse]) -> anyhow::Result<Self> {
+        let uniform = Launch::new(gpu, &Inverse::eq6(), UNIFORM);
+        let foveated = inverses.iter().map(|inverse| Launch::new(gpu, inverse, FOVEATED));
+        let launches: Vec<Launch> = std::iter::once(uniform).chain(foveated).collect();
+        let mut fastest = vec![[f64::INFINITY; 2]; launches.len()];
+        for round in 0..=ROUNDS {
+            for (launch, fastest) in launches.iter().zip(&mut fastest) {
+                for ((rays, runs), fastest) in LAUNCHES.iter().zip(fastest) {
+                    for _ in 0..*runs {
+                        let seconds = launch.seconds(gpu, *rays)?;
+                        if round > 0 {
+                            *fastest = fastest.min(seconds * 1e3);
+                        }
+                    }
+                }
+            }
+        }
+        let (uniform_ms, foveated_ms) = (fastest[0], fastest.split_off(1));
+        Ok(Self { foveated_ms, uniform_ms, on_software: gpu.is_software() })
     }
 
-    /// Milliseconds for each launch with this inverse.
-    pub(super) fn foveated_ms(&self, inverse: &Inverse) -> anyhow::Result<[f64; 2]> {
-        self.time(inverse, FOVEATED)
-    }
-
-    /// The uniform launches, and the default inverse's ratio to them.
-    pub(super) fn uniform_text(&self, entries: &[Entry]) -> anyhow::Result<String> {
-        let od = self.time(&Inverse::eq6(), UNIFORM)?;
+    /// The uniform launches, and the default inverses' ratio to them.
+    pub(super) fn text(&self, entries: &[Entry]) -> String {
+        let od = self.uniform_ms;
         let mut text = format!("\nuniform rays (od): {:.3} ms for 2^16, {:.3} ms for 2^24\n", od[0], od[1]);
         for entry in entries.iter().filter(|e| e.name == "rational3/3" || e.name == "poly5") {
             if let Some([small, large]) = entry.gpu_ms {
@@ -72,14 +88,21 @@ impl<'a> Rays<'a> {
                 );
             }
         }
-        if self.gpu.is_software() {
+        if self.on_software {
             text.push_str("(a software adapter: every instruction costs, nothing hides the warp behind memory)\n");
         }
-        Ok(text)
+        text
     }
+}
 
-    fn time(&self, inverse: &Inverse, ray: &str) -> anyhow::Result<[f64; 2]> {
-        let device = &self.gpu.device;
+struct Launch {
+    pipeline: wgpu::ComputePipeline,
+    bind_group: wgpu::BindGroup,
+}
+
+impl Launch {
+    fn new(gpu: &Gpu, inverse: &Inverse, ray: &str) -> Self {
+        let device = &gpu.device;
         let text = [&wgsl::radial_module(inverse), wgsl::sequence_module().as_str(), ray, MAIN].concat();
         let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("sampler cost"),
@@ -104,25 +127,21 @@ impl<'a> Rays<'a> {
             layout: &pipeline.get_bind_group_layout(0),
             entries: &[wgpu::BindGroupEntry { binding: 0, resource: sink.as_entire_binding() }],
         });
-        let mut fastest = [f64::INFINITY; 2];
-        for ((rays, runs), fastest) in LAUNCHES.iter().zip(&mut fastest) {
-            let groups = rays / WORKGROUP;
-            for run in 0..=*runs {
-                let mut encoder = device.create_command_encoder(&Default::default());
-                {
-                    let mut pass = encoder.begin_compute_pass(&Default::default());
-                    pass.set_pipeline(&pipeline);
-                    pass.set_bind_group(0, &bind_group, &[]);
-                    pass.dispatch_workgroups(groups.min(ROW), groups.div_ceil(ROW), 1);
-                }
-                let start = Instant::now();
-                self.gpu.queue.submit([encoder.finish()]);
-                self.gpu.wait().context("the adapter was lost")?;
-                if run > 0 {
-                    *fastest = fastest.min(start.elapsed().as_secs_f64() * 1e3);
-                }
-            }
+        Self { pipeline, bind_group }
+    }
+
+    fn seconds(&self, gpu: &Gpu, rays: u32) -> anyhow::Result<f64> {
+        let groups = rays / WORKGROUP;
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        {
+            let mut pass = encoder.begin_compute_pass(&Default::default());
+            pass.set_pipeline(&self.pipeline);
+            pass.set_bind_group(0, &self.bind_group, &[]);
+            pass.dispatch_workgroups(groups.min(ROW), groups.div_ceil(ROW), 1);
         }
-        Ok(fastest)
+        let start = Instant::now();
+        gpu.queue.submit([encoder.finish()]);
+        gpu.wait().context("the adapter was lost")?;
+        Ok(start.elapsed().as_secs_f64())
     }
 }

@@ -9,23 +9,38 @@ use fovea_sampler::{GazeWarp, Geometry, RadialDistribution, sequence, uniform_di
 
 /// Directions a run; the numbers fit the second-level cache.
 const DRAWS: u32 = 1 << 15;
-/// Runs, of which the fastest counts: others lost time to something else.
-const RUNS: u32 = 100;
+/// Rounds over all that is compared, and runs of each in a round. The fastest counts: others lost time to something else, and
+/// what slows the machine for a while slows all alike.
+const ROUNDS: u32 = 10;
+const RUNS: u32 = 20;
 
-/// Samplers without foveation, for comparison.
-pub(super) struct Baselines {
+/// Nanoseconds a direction, in batches.
+pub(super) struct Costs {
     disc_ns: f64,
+    /// By the f32 twin of the shader, in the order of the warps.
+    pub(super) warps_ns: Vec<f64>,
 }
 
-impl Baselines {
-    pub(super) fn measure() -> Self {
+impl Costs {
+    pub(super) fn measure(warps: &[GazeWarp]) -> Self {
+        let numbers = numbers(DRAWS);
         let mut directions = vec![[0.0; 3]; DRAWS as usize];
-        Self {
-            disc_ns: fastest_ns(DRAWS, &numbers(DRAWS), |numbers| {
+        let mut costs = Self { disc_ns: f64::INFINITY, warps_ns: vec![f64::INFINITY; warps.len()] };
+        for _ in 0..ROUNDS {
+            let disc_ns = fastest_ns(&numbers, |numbers| {
                 uniform_disc_batch(numbers, &mut directions);
                 black_box(&mut directions);
-            }),
+            });
+            costs.disc_ns = costs.disc_ns.min(disc_ns);
+            for (warp, fastest) in warps.iter().zip(&mut costs.warps_ns) {
+                let warp_ns = fastest_ns(&numbers, |numbers| {
+                    warp.sample_local_batch(numbers, &mut directions);
+                    black_box(&mut directions);
+                });
+                *fastest = fastest.min(warp_ns);
+            }
         }
+        costs
     }
 
     /// The default inverses against a uniform disc sample.
@@ -42,19 +57,9 @@ impl Baselines {
     }
 }
 
-/// Nanoseconds a direction in a batch, by the f32 twin of the shader.
-pub(super) fn direction_ns(warp: &GazeWarp) -> f64 {
-    let mut directions = vec![[0.0; 3]; DRAWS as usize];
-    fastest_ns(DRAWS, &numbers(DRAWS), |numbers| {
-        warp.sample_local_batch(numbers, &mut directions);
-        black_box(&mut directions);
-    })
-}
-
 /// Nanoseconds a radius by root finding in f64.
 pub(super) fn exact_ns(distribution: &RadialDistribution) -> f64 {
-    let draws = DRAWS / 64;
-    fastest_ns(draws, &numbers(draws), |numbers| {
+    fastest_ns(&numbers(DRAWS / 64), |numbers| {
         black_box(numbers.iter().map(|[u, _]| distribution.quantile(f64::from(*u)).radians()).sum::<f64>());
     })
 }
@@ -64,12 +69,12 @@ fn numbers(count: u32) -> Vec<[f32; 2]> {
     (0..count).map(|i| [number(i, 0), number(i, 1)]).collect()
 }
 
-/// Of `draw`, a draw.
-fn fastest_ns(draws: u32, numbers: &[[f32; 2]], mut draw: impl FnMut(&[[f32; 2]])) -> f64 {
+/// A number's share of the fastest run.
+fn fastest_ns(numbers: &[[f32; 2]], mut draw: impl FnMut(&[[f32; 2]])) -> f64 {
     let run = |_| {
         let start = Instant::now();
         draw(black_box(numbers));
         start.elapsed().as_secs_f64()
     };
-    (0..RUNS).map(run).fold(f64::INFINITY, f64::min) * 1e9 / f64::from(draws)
+    (0..RUNS).map(run).fold(f64::INFINITY, f64::min) * 1e9 / numbers.len() as f64
 }
