@@ -101,11 +101,15 @@ impl LogAxis {
 }
 
 impl Chart {
-    /// Error in eccentricity against CPU cost, both logarithmic, with the Pareto front of each geometry.
+    /// Error in eccentricity against CPU cost, both logarithmic, with the Pareto front of each geometry; the fitted inverses
+    /// only.
     #[must_use]
     pub fn error_against_cost(entries: &[Entry], provenance: &Provenance) -> Self {
         let [left, top, right, bottom] = AXES_PX;
-        let cost = LogAxis::around(entries.iter().map(|e| e.cpu_ns), 0.25, [left, right]);
+        // Root finding costs a hundred times as much: it would squeeze all others into a corner.
+        let entries: Vec<Entry> = entries.iter().filter(|entry| entry.errors.is_some()).cloned().collect();
+        let entries = entries.as_slice();
+        let cost = LogAxis::around(entries.iter().map(|e| e.cpu_ns), 0.1, [left, right]);
         let error = LogAxis::around(entries.iter().map(Entry::relative_e), 1.0, [bottom, top]);
         let mut chart = Self { size_px: SIZE_PX, shapes: Vec::new() };
         chart.grid(&cost, &error);
@@ -125,11 +129,12 @@ impl Chart {
             for (entry, filled) in entries.iter().zip(&front).filter(|(e, _)| e.geometry == geometry) {
                 let at = place(entry);
                 chart.shapes.push(Shape::Point { at, filled: *filled, mark });
-                // Left of the point where the right-hand side has no room.
-                let room = at[0] < right - 110.0;
-                let start = if room { at[0] + 9.0 } else { at[0] - 9.0 - 7.2 * entry.name.len() as f64 };
-                let raise = if geometry == Geometry::Sphere { -6.0 } else { 14.0 };
-                chart.text([start, at[1] + raise], &entry.name, false, mark);
+                // The geometries' points lie close together: their names are on different sides.
+                let start = match geometry {
+                    Geometry::Sphere => at[0] - 10.0 - 7.2 * entry.name.len() as f64,
+                    Geometry::Plane => at[0] + 10.0,
+                };
+                chart.text([start, at[1] + 4.0], &entry.name, false, mark);
             }
         }
         chart.text([0.5 * (left + right), 24.0], "Inverses of Reddy's acuity: error against cost", true, Mark::Ink);
@@ -153,9 +158,9 @@ impl Chart {
 
     fn grid(&mut self, cost: &LogAxis, error: &LogAxis) {
         let [left, top, right, bottom] = AXES_PX;
-        // Costs span about a decade: ticks at 1, 2, 3, 5, 7 of each.
+        // Costs span about a decade.
         for decade in cost.decades[0].floor() as i32..=cost.decades[1].ceil() as i32 {
-            for digit in [1.0, 2.0, 3.0, 5.0, 7.0] {
+            for digit in [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0] {
                 let value = digit * 10f64.powi(decade);
                 let x = cost.at(value);
                 if (left - 0.5..=right + 0.5).contains(&x) {
