@@ -18,6 +18,8 @@ const LUMINANCE_SCALE: f64 = 268_435_456.0;
 /// The largest sample: 2^38 quanta; the largest luminance as the shader states it.
 const LARGEST_SAMPLE: f32 = 274_877_906_944.0;
 const LARGEST_LUMINANCE: f32 = 4_294_967_040.0;
+/// Below it the square is rounded instead of the luminance.
+const SMALL_LUMINANCE: f32 = 4096.0;
 
 fn renderer(gpu: &Gpu, film: FilmOptions, sequence: SequenceKind) -> Renderer {
     let options = RendererOptions { film, max_bounces: 4, seed: 7, sequence };
@@ -88,9 +90,13 @@ impl Sums {
         }
         // Exact on every adapter while two of the three channels are zero.
         let luminance = 0.2126 * radiance[0] + 0.7152 * radiance[1] + 0.0722 * radiance[2];
-        let q = quanta((luminance * LUMINANCE_SCALE as f32).min(LARGEST_LUMINANCE), unit(3));
+        let scaled = luminance * LUMINANCE_SCALE as f32;
         self.samples += 1;
-        self.squares += q * q;
+        self.squares += if scaled < SMALL_LUMINANCE {
+            quanta(scaled * scaled, unit(3))
+        } else {
+            quanta(scaled.min(LARGEST_LUMINANCE), unit(3)).pow(2)
+        };
     }
 
     fn of(snapshot: &FilmSnapshot, pixel: usize) -> Self {

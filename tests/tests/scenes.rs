@@ -5,7 +5,7 @@
 use std::f64::consts::PI;
 
 use fovea_tests::{
-    device,
+    device, pencil,
     plant::exchanged,
     scenes::{Builder, emitter, lambert},
 };
@@ -15,7 +15,7 @@ use tracer::{
     film::FilmOptions,
     gpu::Gpu,
     kernels::ShaderSources,
-    renderer::{FilmPose, Renderer, RendererOptions, SequenceKind},
+    renderer::{FilmPose, Renderer, RendererOptions},
     scene::{Material, PunctualKind, PunctualLight, Scene},
 };
 
@@ -23,27 +23,17 @@ const SAMPLES: u64 = 1 << 17;
 /// Relative rounding of a path's arithmetic in f32.
 const ROUNDING: f64 = 2e-5;
 
-/// A pencil of rays from `eye` to `target`: mean luminance and its standard error.
+/// Mean luminance of a pencil of rays from `eye` to `target`, and its standard error; nothing is dropped or clamped.
 fn measure(
     gpu: &Gpu,
     scene: &Scene,
-    [eye, target]: [Vec3; 2],
+    ray: [Vec3; 2],
     max_bounces: u32,
     plant: impl Fn(&ShaderSources) -> ShaderSources,
 ) -> (f64, f64) {
-    let film = FilmOptions::perspective(1, 1, 1e-4);
-    let options = RendererOptions { film, max_bounces, seed: 3, sequence: SequenceKind::Independent };
-    let mut renderer = Renderer::new(gpu, &options, Distribution::omnidirectional(device::inverse())).unwrap();
-    renderer.set_shaders(plant(renderer.shaders())).unwrap();
-    renderer.set_scene(scene).unwrap();
-    let world_from_film = Quat::from_rotation_arc(Vec3::NEG_Z, (target - eye).normalize());
-    renderer.set_pose(FilmPose { position: eye, world_from_film });
-    let film = device::trace(&mut renderer, SAMPLES).unwrap();
-    let statistics = renderer.statistics().unwrap();
-    assert_eq!((statistics.non_finite, statistics.clamped), (0, 0));
-    let pixel = film.pixel(0);
-    let [r, g, b] = pixel.mean;
-    (0.2126 * r + 0.7152 * g + 0.0722 * b, pixel.variance_of_mean.sqrt())
+    let found = pencil::measure(gpu, scene, ray, max_bounces, SAMPLES, plant);
+    assert_eq!((found.statistics.non_finite, found.statistics.clamped), (0, 0));
+    (found.mean, found.error)
 }
 
 fn assert_is(what: &str, (mean, error): (f64, f64), expected: f64) {
@@ -192,6 +182,52 @@ fn punctual_lights() {
     builder.light(PunctualLight { name: String::new(), kind, intensity: Vec3::splat(5.0), position, rotation });
     let beside = target + Vec3::new(0.0, 0.0, 4.0);
     assert_eq!(measure(&gpu, &builder.build(), [Vec3::new(-3.0, 2.0, 0.0), beside], 1, Clone::clone), (0.0, 0.0));
+}
+
+/// A sun of any size lights a surface that faces it with its lux; seen directly and in a mirror it has their radiance.
+#[test]
+fn a_sun_with_an_angular_size() {
+    let gpu = device::gpu();
+    let mirror = Material { metallic: 1.0, roughness: 0.0, ..Default::default() };
+    for degrees in [0.01f32, 0.53, 20.0] {
+        let radius = f64::from(degrees.to_radians()) * 0.5;
+        let to_sun = Vec3::new(0.6, 0.8, 0.0);
+        let sun = PunctualLight {
+            name: String::new(),
+            kind: PunctualKind::Directional { angular_diameter: degrees.to_radians() },
+            intensity: Vec3::splat(5.0),
+            position: Vec3::ZERO,
+            rotation: Quat::from_rotation_arc(Vec3::NEG_Z, -to_sun),
+        };
+        let scene = |material: Material| {
+            let mut builder = Builder::new(Vec3::ZERO);
+            let material = builder.material(material);
+            builder.quad(Vec3::new(-20.0, 0.0, -20.0), Vec3::Z * 40.0, Vec3::X * 40.0, material);
+            builder.light(sun.clone());
+            builder.build()
+        };
+        let on_the_floor = measure(&gpu, &scene(lambert(Vec3::splat(0.4))), [Vec3::Y, Vec3::ZERO], 1, Clone::clone);
+        assert_is(&format!("floor under {degrees} degrees"), on_the_floor, 0.4 / PI * 5.0 * 0.8);
+        let radiance = 5.0 / (PI * radius.sin().powi(2));
+        let directly = measure(&gpu, &scene(mirror.clone()), [Vec3::Y, Vec3::Y + to_sun], 0, Clone::clone);
+        assert_is(&format!("{degrees} degrees, seen"), directly, radiance);
+        let mirrored = Vec3::new(-to_sun.x, to_sun.y, to_sun.z);
+        let in_mirror = measure(&gpu, &scene(mirror.clone()), [mirrored, Vec3::ZERO], 1, Clone::clone);
+        assert_is(&format!("{degrees} degrees, in a mirror"), in_mirror, radiance);
+        // A glossy surface is reached by both ways of sampling: the lights' and the BSDF's.
+        let glossy = Material { roughness: 0.35, ..mirror.clone() };
+        let both = measure(&gpu, &scene(glossy.clone()), [mirrored, Vec3::ZERO], 1, Clone::clone);
+        let no_next_event = |sources: &ShaderSources| {
+            exchanged(
+                sources,
+                "path::shade",
+                &[("var contribution = f.value * weight;", "var contribution = vec3f(0.0);")],
+            )
+        };
+        let bsdf_share = measure(&gpu, &scene(glossy), [mirrored, Vec3::ZERO], 1, no_next_event);
+        eprintln!("{degrees} degrees, glossy: {both:?}, of which by BSDF sampling {:.4}", bsdf_share.0);
+        assert!(bsdf_share.0 < both.0 && both.1 <= 0.01 * both.0);
+    }
 }
 
 /// A slab of smooth glass before a glowing wall: T = (1 - R) / (1 + R) with Fresnel's R, all internal reflections summed.

@@ -126,6 +126,9 @@ pub struct RenderArgs {
 pub struct InfoArgs {
     /// The glTF scene (.glb or .gltf) [default: the built-in one]
     pub scene: Option<PathBuf>,
+    /// What of the file is shown.
+    #[command(flatten)]
+    pub file: FileArgs,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,
@@ -159,9 +162,32 @@ pub struct SceneArgs {
         value_parser = values::finite, value_name = "DEG"
     )]
     pub env_rotate: f32,
+    /// Angle that directional lights subtend, degrees: higher softens their shadows; the sun has 0.53
+    #[arg(
+        long, allow_negative_numbers = true, default_value_t = 0.0,
+        value_parser = values::sun_angle_deg, value_name = "DEG"
+    )]
+    pub sun_angle: f32,
+    /// What of the file is shown.
+    #[command(flatten)]
+    pub file: FileArgs,
     /// Graphics adapter whose name contains this [default: as `fovea adapters` says]
     #[arg(long, value_name = "NAME")]
     pub adapter: Option<String>,
+}
+
+/// What of a glTF file is shown.
+#[derive(Clone, Debug, Default, Args)]
+pub struct FileArgs {
+    /// Scene of a file that has several, by its place from 0 [default: the file's]
+    #[arg(long, value_name = "N")]
+    pub gltf_scene: Option<usize>,
+    /// Moment of the file's animations, seconds [default: the pose that the file states]
+    #[arg(long, allow_negative_numbers = true, value_parser = values::finite, value_name = "SECONDS")]
+    pub time: Option<f32>,
+    /// Material variant by name; `fovea info` lists them [default: the file's materials]
+    #[arg(long, value_name = "NAME")]
+    pub variant: Option<String>,
 }
 
 /// How samples are placed and paths are traced.

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use anyhow::{Context, bail};
 use glam::{Quat, Vec3};
 use tracer::import::{ImportOptions, ImportReport, ImportWarning};
-use tracer::scene::{Environment, Projection, Scene};
+use tracer::scene::{Environment, Projection, PunctualKind, Scene};
 
-use crate::cli::SceneArgs;
 use crate::cli::values::CameraChoice;
+use crate::cli::{FileArgs, SceneArgs};
 
 /// Vertical angle of view where a camera has none, radians.
 const DEFAULT_VFOV: f32 = 50.0 * std::f32::consts::PI / 180.0;
@@ -68,7 +68,7 @@ pub struct Loaded {
 /// # Errors
 /// When the scene or the environment image cannot be read.
 pub fn load(source: &Source, args: &SceneArgs) -> anyhow::Result<Loaded> {
-    let (mut scene, report) = import(source)?;
+    let (mut scene, report) = import(source, &args.file)?;
     let mut warnings = report.warnings;
     let mut repaired = None;
     let environment = match (&args.background, &args.env) {
@@ -91,6 +91,11 @@ pub fn load(source: &Source, args: &SceneArgs) -> anyhow::Result<Loaded> {
         scene.environment = environment;
         warnings.retain(|warning| *warning != ImportWarning::NoLight);
     }
+    for light in &mut scene.lights {
+        if let PunctualKind::Directional { angular_diameter } = &mut light.kind {
+            *angular_diameter = args.sun_angle.to_radians();
+        }
+    }
     let notes = warnings.iter().map(ToString::to_string).chain(repaired).collect();
     Ok(Loaded { scene: Arc::new(scene), notes })
 }
@@ -99,10 +104,11 @@ pub fn load(source: &Source, args: &SceneArgs) -> anyhow::Result<Loaded> {
 ///
 /// # Errors
 /// When it cannot be read.
-pub fn import(source: &Source) -> anyhow::Result<(Scene, ImportReport)> {
+pub fn import(source: &Source, args: &FileArgs) -> anyhow::Result<(Scene, ImportReport)> {
+    let options = ImportOptions { scene: args.gltf_scene, time_secs: args.time, variant: args.variant.clone() };
     match source {
         Source::BuiltIn => tracer::builtin::scene().context("the built-in scene"),
-        Source::File(path) => Ok(tracer::import::load_gltf(path, &ImportOptions::default())?),
+        Source::File(path) => Ok(tracer::import::load_gltf(path, &options)?),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::scene::{AlphaMode, Environment, Material, Scene};
+use crate::scene::{AlphaMode, Environment, Material, PunctualLight, Scene};
 
 macro_rules! features {
     ($($(#[$doc:meta])* $variant:ident = $name:literal,)*) => {
@@ -38,6 +38,8 @@ features! {
     Emission = "EMISSION",
     /// There are emissive triangles or punctual lights to sample.
     Lights = "LIGHTS",
+    /// Some directional light has an angular size: rays that leave the scene may see it.
+    SunDiscs = "SUN_DISCS",
     /// The environment is an image and is sampled; a constant one is left to BSDF sampling.
     EnvironmentImage = "ENVIRONMENT_IMAGE",
     /// Some material transmits light.
@@ -86,6 +88,7 @@ impl SceneFeatures {
             )
             .with(Feature::Emission, emits)
             .with(Feature::Lights, emits || !scene.lights.is_empty())
+            .with(Feature::SunDiscs, scene.lights.iter().any(PunctualLight::is_disc))
             .with(Feature::EnvironmentImage, matches!(scene.environment, Environment::Image { .. }))
             .with(Feature::Transmission, any(|m| m.transmission > 0.0))
             .with(Feature::Solid, any(|m| m.transmission > 0.0 && m.thickness > 0.0))

@@ -336,6 +336,15 @@ pub struct PunctualLight {
     pub rotation: Quat,
 }
 
+impl PunctualLight {
+    /// A directional light with an angular size that shines: it can be seen, in mirrors too.
+    #[must_use]
+    pub fn is_disc(&self) -> bool {
+        let PunctualKind::Directional { angular_diameter } = self.kind else { return false };
+        angular_diameter > 0.0 && self.intensity.max_element() > 0.0
+    }
+}
+
 /// What a glTF camera sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Projection {

@@ -45,12 +45,14 @@ fn every_option_of_render_is_read() {
          --view -30,10,90x60 --gaze -12.5,-3 --clip view --eccentricity eye --samples 5000000000 --max-bounces 0 \
          --seed 4294967295 --sequence independent --env sky.hdr --env-rotate -90 --model reddy --geometry plane \
          --inverse eq6 --floor 0 --exposure -1.5 --tonemap pbr-neutral --json --dump-kernels out --adapter llvmpipe \
-         --screen-mm 600x340 --distance-mm 700",
+         --screen-mm 600x340 --distance-mm 700 --sun-angle 0.53 --gltf-scene 1 --time -0.5 --variant beach",
     );
     assert_eq!(args.scene.camera, Some(CameraChoice::Name("Front".into())));
     assert_eq!(args.view, Some(ViewAngles { yaw_deg: -30.0, pitch_deg: 10.0, hfov_deg: 90.0, vfov_deg: 60.0 }));
     assert_eq!(args.gaze, GazeAngles { yaw_deg: -12.5, pitch_deg: -3.0 });
     assert_eq!(args.stop.samples, Some(5_000_000_000));
+    assert_eq!((args.scene.sun_angle, args.scene.file.gltf_scene, args.scene.file.time), (0.53, Some(1), Some(-0.5)));
+    assert_eq!(args.scene.file.variant.as_deref(), Some("beach"));
     assert_eq!((args.scene.env_rotate, args.picture.exposure), (-90.0, -1.5));
     assert_eq!(args.sampling.screen_mm, SizeMm { width: 600.0, height: 340.0 });
     assert_eq!(render("-o a.exr --camera 2").scene.camera, Some(CameraChoice::Index(2)));
@@ -77,6 +79,8 @@ fn wrong_values_are_refused_in_one_line_that_names_the_option_and_the_cause() {
         ("fovea render -o a.exr --spp 0", "--spp", "0 is not in"),
         ("fovea render -o a.exr --seed -1", "--seed", "-1 is not in"),
         ("fovea render -o a.exr --mode best", "--mode", "fv"),
+        ("fovea render -o a.exr --sun-angle 181", "--sun-angle", "degrees"),
+        ("fovea render -o a.exr --time nan", "--time", "out of range"),
         ("fovea render -o a.exr --distance-mm 0", "--distance-mm", "mm"),
         ("fovea render a.glb", "--output", "required"),
         ("fovea render -o a.exr --spp 1 --seconds 1", "--spp", "cannot be used"),

@@ -181,6 +181,11 @@ pub fn distance_mm(text: &str) -> Result<f32, String> {
     in_range(text, 50.0, 100_000.0, "mm")
 }
 
+/// Degrees, 0 to 180.
+pub fn sun_angle_deg(text: &str) -> Result<f32, String> {
+    in_range(text, 0.0, 180.0, "degrees")
+}
+
 /// Seconds, above 0 and at most 1e7.
 pub fn positive_seconds(text: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;

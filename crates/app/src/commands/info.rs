@@ -14,7 +14,7 @@ use crate::settings::scene_hash;
 /// # Errors
 /// When the scene cannot be loaded.
 pub fn run(args: &InfoArgs) -> anyhow::Result<()> {
-    let (scene, report) = session::import(&Source::from(args.scene.as_deref()))?;
+    let (scene, report) = session::import(&Source::from(args.scene.as_deref()), &args.file)?;
     if args.json { print_json(&describe(&scene, &report)) } else { print_text(&text(&scene, &report)) }
 }
 

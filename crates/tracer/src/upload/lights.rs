@@ -1,5 +1,7 @@
 //! The light table: every emissive triangle and punctual light, weighted by power.
 
+use std::collections::{HashMap, hash_map::Entry};
+
 use glam::Vec3;
 
 use super::{AliasTable, geometry::Geometry};
@@ -21,6 +23,7 @@ impl LightTable {
     pub(super) fn build(scene: &Scene, geometry: &mut Geometry) -> Self {
         let mut lights = Vec::new();
         let mut powers = Vec::new();
+        let mut twins = Twins::default();
         let mut brightest: f32 = 0.0;
         for (index, source) in geometry.sources.iter().enumerate() {
             let Some(source) = *source else { continue };
@@ -46,8 +49,9 @@ impl LightTable {
                     std::mem::swap(&mut b, &mut c);
                 }
                 let (edge_1, edge_2) = (b - a, c - a);
-                powers
-                    .push(radiance * std::f64::consts::PI * 0.5 * edge_1.as_dvec3().cross(edge_2.as_dvec3()).length());
+                let two_areas = edge_1.as_dvec3().cross(edge_2.as_dvec3()).length();
+                let is_twin = twins.enter([a, b, c], material.double_sided, lights.len());
+                powers.push(if is_twin { 0.0 } else { radiance * std::f64::consts::PI * 0.5 * two_areas });
                 lights.push(layout::Light {
                     position: a.to_array(),
                     edge_1: edge_1.to_array(),
@@ -63,10 +67,15 @@ impl LightTable {
             enter_triangles(geometry, &mut lights);
         }
         let reach = scene_radius(scene);
-        for light in scene.lights.iter().filter(|light| light.intensity.max_element() > 0.0) {
-            brightest = brightest.max(light.intensity.max_element());
+        let (discs, others): (Vec<_>, Vec<_>) =
+            scene.lights.iter().filter(|light| light.intensity.max_element() > 0.0).partition(|light| light.is_disc());
+        // Discs last: that is where rays that leave the scene look for them.
+        for light in others.into_iter().chain(discs) {
+            let encoded = encode_punctual(light);
+            let seen = if light.is_disc() { encoded.cone[1] } else { 1.0 };
+            brightest = brightest.max(light.intensity.max_element() * seen);
             powers.push(punctual_power(light, reach));
-            lights.push(encode_punctual(light));
+            lights.push(encoded);
         }
         let table = AliasTable::build(&powers);
         for (i, light) in lights.iter_mut().enumerate() {
@@ -74,7 +83,43 @@ impl LightTable {
             light.alias_threshold = table.thresholds[i];
             light.alias_index = table.aliases[i];
         }
+        for &(twin, first) in &twins.pairs {
+            lights[twin].probability = lights[first].probability;
+        }
         Self { lights, brightest }
+    }
+}
+
+/// Emissive triangles in the same place, facing the same way. A ray sees one of them, so only the first is sampled; the
+/// others have its density, since a ray may hit any of them.
+#[derive(Default)]
+struct Twins {
+    firsts: HashMap<[[u32; 3]; 3], usize>,
+    /// Twin and first.
+    pairs: Vec<(usize, usize)>,
+}
+
+impl Twins {
+    /// Whether light `index` stands where an earlier one does.
+    fn enter(&mut self, corners: [Vec3; 3], double_sided: bool, index: usize) -> bool {
+        let mut key = corners.map(|corner| corner.to_array().map(f32::to_bits));
+        if double_sided {
+            key.sort_unstable();
+        } else {
+            // The order of the corners says which side is the front.
+            let first = (0..3).min_by_key(|&i| key[i]).unwrap_or(0);
+            key.rotate_left(first);
+        }
+        match self.firsts.entry(key) {
+            Entry::Vacant(vacant) => {
+                vacant.insert(index);
+                false
+            }
+            Entry::Occupied(first) => {
+                self.pairs.push((index, *first.get()));
+                true
+            }
+        }
     }
 }
 
@@ -109,7 +154,10 @@ fn encode_punctual(light: &PunctualLight) -> layout::Light {
         PunctualKind::Point => (codes::LIGHT_POINT, [0.0; 2]),
         PunctualKind::Spot { inner_angle, outer_angle } => (codes::LIGHT_SPOT, [outer_angle.cos(), inner_angle.cos()]),
         PunctualKind::Directional { angular_diameter } => {
-            (codes::LIGHT_DIRECTIONAL, [(angular_diameter * 0.5).cos(), 0.0])
+            let radius = f64::from(angular_diameter.clamp(0.0, std::f32::consts::PI)) * 0.5;
+            let versine = 2.0 * (0.5 * radius).sin().powi(2);
+            let per_solid_angle = if versine > 0.0 { 1.0 / (std::f64::consts::TAU * versine) } else { 0.0 };
+            (codes::LIGHT_DIRECTIONAL, [versine as f32, per_solid_angle as f32])
         }
     };
     layout::Light {
