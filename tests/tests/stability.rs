@@ -1,6 +1,6 @@
 //! Where arithmetic gets hard: scales, slivers, contacts, grazing rays, extreme emitters, long paths. Each case has a value
 //! in closed form; all of them together are the table of docs/reports/stability.md:
-//! `FOVEA_LONG_RUNS=1 cargo test -p fovea-tests --test stability -- --nocapture --test-threads 1 | grep '^|'`.
+//! `FOVEA_LONG_RUNS=1 cargo test -p fovea-tests --test stability -- --nocapture --test-threads 1 2>&1 | grep '^|'`.
 //!
 //! Most are a closed room whose surfaces have one albedo and one emission: the radiance is known whatever stands in it, and
 //! since it stands in an environment a thousand times as bright, the smallest leak shows.
@@ -35,7 +35,7 @@ const BOUNCES: u32 = 6;
 /// A row of the report: the found value must be within three standard errors of the expected one.
 fn row(case: &str, found: Measured, expected: f64) {
     let difference = found.mean - expected;
-    println!(
+    eprintln!(
         "| {case} | {expected:.6e} | {:.6e} | {:.1e} | {:+.1e} |",
         found.mean,
         found.error,
@@ -83,7 +83,7 @@ fn scales_and_distances_from_the_origin() {
         let found = in_room(&gpu, &room(centre, 1.0, |_, _| {}), centre, 1.0);
         let leak = (found.mean - closed_furnace()) / 1e3;
         let error = found.error / 1e3;
-        println!(
+        eprintln!(
             "| share of paths that leave a closed room of 1 m {distance:.0e} m off | 0 | {leak:.1e} | {error:.1e} | |"
         );
         assert!(leak.abs() < largest, "{leak:e}");
@@ -432,7 +432,7 @@ fn a_closed_mesh_has_no_gaps() {
     renderer.set_scene(&builder.build()).unwrap();
     let film = device::trace(&mut renderer, 1 << 20).unwrap();
     let worst = film.pixels().map(|pixel| (pixel.mean[1] - 1.0).abs()).fold(0.0, f64::max);
-    println!("| 2^20 rays from inside a mesh of 16,128 triangles | 1 | no leak | | {worst:.1e} |");
+    eprintln!("| 2^20 rays from inside a mesh of 16,128 triangles | 1 | no leak | | {worst:.1e} |");
     assert!(worst < 1e-9, "a ray went through: {worst}");
 }
 
@@ -454,12 +454,12 @@ fn many_samples_in_one_pixel() {
     let square = (63.0 + 1e6) / 64.0 / 9.0;
     let error = (pixel.mean[1] - expected) / expected;
     let deviation = (square - expected * expected).sqrt() / f64::from(1u32 << log2).sqrt();
-    println!("| 2^{log2} samples in one pixel | {expected:.6e} | {:.6e} | | {error:+.1e} |", pixel.mean[1]);
+    eprintln!("| 2^{log2} samples in one pixel | {expected:.6e} | {:.6e} | | {error:+.1e} |", pixel.mean[1]);
     assert!(error.abs() < 1e-7, "{error:e}");
     assert!((pixel.variance_of_mean.sqrt() / deviation - 1.0).abs() < 1e-4, "{pixel:?}");
     let plain = (0..1u32 << log2).fold(0.0f32, |sum, i| sum + if i % 64 == 0 { 1000.0 } else { 1.0 } / 3.0);
     let plain_error = f64::from(plain) / f64::from(1u32 << log2) / expected - 1.0;
-    println!("| the same in a plain f32 sum, for comparison | {expected:.6e} | | | {plain_error:+.1e} |");
+    eprintln!("| the same in a plain f32 sum, for comparison | {expected:.6e} | | | {plain_error:+.1e} |");
 }
 
 /// What the room shows when rays start closer to their surface than its rounding: the cases above do notice.
@@ -476,7 +476,7 @@ fn an_offset_that_is_too_small_is_noticed() {
             if log2 == -21 { sources.clone() } else { exchanged(sources, "scene::surface", &[(offset, &planted)]) }
         });
         let relative = found.mean / closed_furnace() - 1.0;
-        println!(
+        eprintln!(
             "| offset of 2^{} of the coordinate, 1e3 m off | {:.6e} | {:.6e} | {:.1e} | {relative:+.1e} |",
             log2 + 2,
             closed_furnace(),
