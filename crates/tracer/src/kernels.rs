@@ -30,6 +30,12 @@ pub const TEXEL_PAGE_BITS: u32 = 11;
 /// Dimensions taken from the Sobol sequence: pixel, place in it, and the first bounce's six. Later ones are hashed: the
 /// matrix products of 32 dimensions took a sixth of the time on lavapipe.
 pub const SOBOL_DIMENSIONS: u32 = 10;
+/// Entries of the tables of rough lobes' albedos along the angle.
+pub const ALBEDO_COLUMNS: u32 = 64;
+/// Entries along the roughness.
+pub const ALBEDO_ROWS: u32 = 32;
+/// Entries of the tables of rough glass along angle, roughness and index.
+pub const GLASS_SIZE: u32 = 16;
 /// Russian roulette starts at this bounce.
 pub const FIRST_ROULETTE_BOUNCE: u32 = 4;
 
@@ -46,7 +52,13 @@ const MODULES: &[(&str, &str)] = &[
     ("scene::texture", include_str!("../../../shaders/scene/texture.wesl")),
     ("scene::alpha", include_str!("../../../shaders/scene/alpha.wesl")),
     ("scene::surface", include_str!("../../../shaders/scene/surface.wesl")),
+    ("shading::fresnel", include_str!("../../../shaders/shading/fresnel.wesl")),
+    ("shading::layers", include_str!("../../../shaders/shading/layers.wesl")),
+    ("shading::lobes", include_str!("../../../shaders/shading/lobes.wesl")),
     ("shading::microfacet", include_str!("../../../shaders/shading/microfacet.wesl")),
+    ("shading::normal", include_str!("../../../shaders/shading/normal.wesl")),
+    ("shading::sheen", include_str!("../../../shaders/shading/sheen.wesl")),
+    ("shading::tables", include_str!("../../../shaders/shading/tables.wesl")),
     ("shading::bsdf", include_str!("../../../shaders/shading/bsdf.wesl")),
     ("light::environment", include_str!("../../../shaders/light/environment.wesl")),
     ("light::emitters", include_str!("../../../shaders/light/emitters.wesl")),
@@ -248,6 +260,9 @@ fn constants_module(c: &KernelConstants) -> String {
         ("TILE_SIZE", TILE_SIZE),
         ("FILM_WORDS", FILM_WORDS),
         ("TEXEL_PAGE_BITS", TEXEL_PAGE_BITS),
+        ("ALBEDO_COLUMNS", ALBEDO_COLUMNS),
+        ("ALBEDO_ROWS", ALBEDO_ROWS),
+        ("GLASS_SIZE", GLASS_SIZE),
         ("FIRST_ROULETTE_BOUNCE", FIRST_ROULETTE_BOUNCE),
         ("SOBOL_DIMENSIONS", SOBOL_DIMENSIONS),
         ("STACK_SIZE", c.stack_size.max(1)),

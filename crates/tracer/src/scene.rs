@@ -302,6 +302,19 @@ impl Default for Material {
     }
 }
 
+impl Material {
+    /// True for a volume that light enters: it refracts or scatters at its surface and absorbs inside.
+    pub fn is_solid(&self) -> bool {
+        self.thickness > 0.0 && (self.transmission > 0.0 || self.diffuse_transmission > 0.0)
+    }
+
+    /// True when something is mirrored: metal, or a dielectric whose specular reflectance is not 0.
+    pub fn is_specular(&self) -> bool {
+        let dielectric = self.specular > 0.0 || self.transmission > 0.0 || self.iridescence > 0.0;
+        self.metallic > 0.0 || dielectric
+    }
+}
+
 /// What kind of punctual light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PunctualKind {
