@@ -140,12 +140,16 @@ impl Bench {
         self.run(gpu, Clone::clone, (BINS, BINS * POINTS * POINTS), &body)
     }
 
-    /// Mean weight of samples, 0 for those that fail: the albedo in each case.
-    pub fn furnace(&self, gpu: &Gpu, samples: u32) -> Vec<FilmPixel> {
-        let body = "    let next = sample_bsdf(c.b, c.wo, u);
-    pixel = case_index;
-    radiance = select(vec3f(0.0), next.weight, next.is_valid);";
-        self.run(gpu, Clone::clone, (1, samples), body)
+    /// Mean weight of samples, 0 for those that fail: the albedo in each case of the first `channels` channels, a pixel each.
+    pub fn furnace(&self, gpu: &Gpu, samples: u32, channels: u32) -> Vec<FilmPixel> {
+        let body = format!(
+            "    let next = sample_bsdf(c.b, c.wo, u);
+    let channel = part % {channels}u;
+    pixel = case_index * {channels}u + channel;
+    let weight = select(next.weight.x, select(next.weight.y, next.weight.z, channel == 2u), channel > 0u);
+    radiance = vec3f(select(0.0, weight, next.is_valid));"
+        );
+        self.run(gpu, Clone::clone, (channels, samples * channels), &body)
     }
 
     fn items(&self) -> String {

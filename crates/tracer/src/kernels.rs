@@ -32,10 +32,12 @@ pub const TEXEL_PAGE_BITS: u32 = 11;
 pub const SOBOL_DIMENSIONS: u32 = 10;
 /// Entries of the tables of rough lobes' albedos along the angle.
 pub const ALBEDO_COLUMNS: u32 = 64;
-/// Entries along the roughness.
-pub const ALBEDO_ROWS: u32 = 32;
-/// Entries of the tables of rough glass along angle, roughness and index.
-pub const GLASS_SIZE: u32 = 16;
+/// Entries along the roughness; the least roughness of sheen, 0.1, is one of them.
+pub const ALBEDO_ROWS: u32 = 31;
+/// Entries of the tables of rough glass along angle and roughness.
+pub const GLASS_SIZE: u32 = 20;
+/// Entries along the index.
+pub const GLASS_LAYERS: u32 = 33;
 /// Russian roulette starts at this bounce.
 pub const FIRST_ROULETTE_BOUNCE: u32 = 4;
 
@@ -263,6 +265,7 @@ fn constants_module(c: &KernelConstants) -> String {
         ("ALBEDO_COLUMNS", ALBEDO_COLUMNS),
         ("ALBEDO_ROWS", ALBEDO_ROWS),
         ("GLASS_SIZE", GLASS_SIZE),
+        ("GLASS_LAYERS", GLASS_LAYERS),
         ("FIRST_ROULETTE_BOUNCE", FIRST_ROULETTE_BOUNCE),
         ("SOBOL_DIMENSIONS", SOBOL_DIMENSIONS),
         ("STACK_SIZE", c.stack_size.max(1)),
