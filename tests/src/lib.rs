@@ -1,6 +1,7 @@
 //! What the tests that span crates share: the adapter, scenes made in code, and the statistics that decide.
 
 pub mod device;
+pub mod lobes;
 pub mod pencil;
 pub mod plant;
 pub mod scenes;

@@ -5,7 +5,6 @@ use tracer::{
     distribution::Distribution,
     film::FilmOptions,
     gpu::Gpu,
-    kernels::ShaderSources,
     renderer::{FilmPose, RenderStatistics, Renderer, RendererOptions, SequenceKind},
     scene::Scene,
 };
@@ -23,7 +22,7 @@ pub struct Measured {
     pub statistics: RenderStatistics,
 }
 
-/// Traces independent samples from `eye` to `target` through a pixel of 1e-4 radians.
+/// Traces independent samples from `eye` to `target` through a pixel of 1e-4 radians. `prepare` may plant something.
 ///
 /// # Panics
 /// When the scene does not fit or the kernels do not compile.
@@ -33,13 +32,13 @@ pub fn measure(
     [eye, target]: [Vec3; 2],
     max_bounces: u32,
     samples: u64,
-    plant: impl Fn(&ShaderSources) -> ShaderSources,
+    prepare: impl FnOnce(&mut Renderer),
 ) -> Measured {
     let film = FilmOptions::perspective(1, 1, 1e-4);
     let options = RendererOptions { film, max_bounces, seed: 3, sequence: SequenceKind::Independent };
     let everywhere = Distribution::omnidirectional(device::inverse());
     let mut renderer = Renderer::new(gpu, &options, everywhere).expect("a film of one pixel");
-    renderer.set_shaders(plant(renderer.shaders())).expect("the kernels compile");
+    prepare(&mut renderer);
     renderer.set_scene(scene).expect("a small scene");
     let world_from_film = Quat::from_rotation_arc(Vec3::NEG_Z, (target - eye).normalize());
     renderer.set_pose(FilmPose { position: eye, world_from_film });

@@ -37,12 +37,14 @@ fn permutations() -> Vec<SceneFeatures> {
     // What the paper's scenes need.
     let room = SceneFeatures::default().with(Feature::Emission, true).with(Feature::Lights, true);
     let glazed = room.with(Feature::Transmission, true).with(Feature::Textures, true);
+    let painted = room.with(Feature::Clearcoat, true).with(Feature::Specular, true).with(Feature::Transmission, true);
     let cloister = SceneFeatures::default()
         .with(Feature::Lights, true)
         .with(Feature::Textures, true)
         .with(Feature::NormalMaps, true)
         .with(Feature::Alpha, true);
     sets.extend([room, room.with(Feature::Textures, true), glazed, glazed.with(Feature::Instances, true), cloister]);
+    sets.extend([painted, cloister.with(Feature::Specular, true), cloister.with(Feature::Clearcoat, true)]);
     sets.into_iter().map(closed).collect()
 }
 
@@ -50,7 +52,13 @@ fn permutations() -> Vec<SceneFeatures> {
 fn closed(mut features: SceneFeatures) -> SceneFeatures {
     for (feature, implied) in [
         (Feature::Emission, Feature::Lights),
+        (Feature::ClearSheets, Feature::Transmission),
+        (Feature::SunDiscs, Feature::Lights),
+        (Feature::Dispersion, Feature::Solid),
         (Feature::Solid, Feature::Transmission),
+        (Feature::Transmission, Feature::Specular),
+        (Feature::Anisotropy, Feature::Specular),
+        (Feature::Iridescence, Feature::Specular),
         (Feature::NormalMaps, Feature::Textures),
         (Feature::SpecularTextures, Feature::Textures),
     ] {
@@ -175,6 +183,7 @@ fn constants_are_those_of_the_host() {
         MATERIAL_ALPHA_BLEND,
         MATERIAL_UNLIT,
         MATERIAL_SOLID,
+        MATERIAL_CLEAR_SHEET,
         TEXTURE_LINEAR_FILTER,
         TEXTURE_UV1,
         WRAP_REPEAT,
@@ -217,6 +226,8 @@ fn a_diffuse_scene_has_a_kernel_without_lights_textures_and_lobes_that_it_lacks(
         "fresnel_dielectric",
         "world_from_mesh[",
         "power_heuristic",
+        "lobe_tables",
+        "sample_visible_normal",
     ] {
         // Mangled names escape their underscores by a count in front.
         assert!(full.contains(word), "the kernel of everything does not contain {word}");
@@ -233,4 +244,36 @@ fn a_diffuse_scene_has_a_kernel_without_lights_textures_and_lobes_that_it_lacks(
     assert!(bindings(&plain) < bindings(&full));
     // The text says what is bound; a scene's features follow from its data.
     assert_eq!(renderer.key(Kernel::Trace).features, SceneFeatures::default());
+}
+
+/// Each lobe is in the kernel when its flag is set, and only then.
+#[test]
+fn lobes_are_compiled_in_by_their_flags() {
+    let sources = sources();
+    for (feature, word) in [
+        (Feature::Specular, "specular_fresnel"),
+        (Feature::Clearcoat, "coat_of"),
+        (Feature::Sheen, "charlie_value"),
+        (Feature::Anisotropy, "is_tangent_needed"),
+        (Feature::Iridescence, "fresnel_film"),
+        (Feature::DiffuseTransmission, "diffuse_transmission_of"),
+        (Feature::Transmission, "transmitted_delta"),
+        (Feature::Solid, "glass_albedos"),
+        (Feature::ClearSheets, "sheet_transmittance"),
+        (Feature::SunDiscs, "sun_discs_radiance"),
+        (Feature::Absorption, "absorption * "),
+        (Feature::Dispersion, "etas"),
+    ] {
+        let with =
+            compose(&key(Kernel::Trace, closed(SceneFeatures::default().with(feature, true)), &sources)).unwrap();
+        assert!(with.contains(word), "the kernel with {} lacks {word}", feature.name());
+        let needs: Vec<Feature> = Feature::ALL
+            .iter()
+            .copied()
+            .filter(|&other| !closed(SceneFeatures::default().with(other, true)).contains(feature))
+            .filter(|&other| !(feature == Feature::Anisotropy && other == Feature::NormalMaps))
+            .collect();
+        let without = compose(&key(Kernel::Trace, needs.into_iter().collect(), &sources)).unwrap();
+        assert!(!without.contains(word), "the kernel without {} contains {word}", feature.name());
+    }
 }

@@ -20,7 +20,6 @@ use tracer::{
     film::FilmOptions,
     gpu::Gpu,
     import::{ImportOptions, load_glb_bytes},
-    kernels::ShaderSources,
     renderer::{Renderer, RendererOptions, SequenceKind},
     scene::{Environment, Material, Scene},
 };
@@ -67,7 +66,7 @@ fn room(centre: Vec3, half: f32, more: impl FnOnce(&mut Builder, u32)) -> Scene 
 
 fn in_room(gpu: &Gpu, scene: &Scene, centre: Vec3, half: f32) -> Measured {
     let ray = [centre + half * Vec3::new(0.1, -0.2, 0.3), centre + half * Vec3::new(0.7, 0.5, -0.4)];
-    measure(gpu, scene, ray, BOUNCES, SAMPLES, Clone::clone)
+    measure(gpu, scene, ray, BOUNCES, SAMPLES, |_| {})
 }
 
 #[test]
@@ -102,7 +101,7 @@ fn scales_and_distances_from_the_origin() {
         let lamp = builder.material(emitter(Vec3::splat(3.0)));
         builder.quad(Vec3::new(-1.0, 1.5, -1.0) * scale, Vec3::X * 2.0 * scale, Vec3::Z * 2.0 * scale, lamp);
         let ray = [Vec3::new(6.0, 1.0, 0.0) * scale, Vec3::ZERO];
-        let found = measure(&gpu, &builder.build(), ray, 1, SAMPLES, Clone::clone);
+        let found = measure(&gpu, &builder.build(), ray, 1, SAMPLES, |_| {});
         row(
             &format!("lamp of {:.0e} m over a floor", 2.0 * scale),
             found,
@@ -251,7 +250,7 @@ fn grazing_rays() {
     for degrees in [89.0f64, 89.9, 89.99] {
         let (sin, cos) = degrees.to_radians().sin_cos();
         let eye = Vec3::new(sin as f32, cos as f32, 0.0) * 10.0;
-        let found = measure(&gpu, &scene, [eye, Vec3::ZERO], 4, SAMPLES, Clone::clone);
+        let found = measure(&gpu, &scene, [eye, Vec3::ZERO], 4, SAMPLES, |_| {});
         row(&format!("white floor at {degrees} degrees"), found, 1.0);
     }
 }
@@ -275,7 +274,7 @@ fn a_light_that_touches_a_surface() {
         // From close by, so that the light hardly changes within the pencil.
         let target = Vec3::new(0.0, 0.0, distance as f32);
         let ray = [target + Vec3::new(0.0, 0.5, 1.0) * distance as f32, target];
-        let found = measure(&gpu, &scene, ray, 1, SAMPLES, Clone::clone);
+        let found = measure(&gpu, &scene, ray, 1, SAMPLES, |_| {});
         row(&format!("floor {distance:.0e} m from a light that stands on it"), found, 0.7 * 3.0 * factor);
     }
 }
@@ -307,7 +306,7 @@ fn glass_from_inside_and_indices_of_one() {
         ("camera inside glass (1.5) inside glass (1.33)", vec![(1.0, 1.33), (0.5, 1.5)]),
         ("camera inside glass of index 1", vec![(1.0, 1.0)]),
     ] {
-        row(case, measure(&gpu, &ball(&radii), inside, 200, SAMPLES, Clone::clone), 1.0);
+        row(case, measure(&gpu, &ball(&radii), inside, 200, SAMPLES, |_| {}), 1.0);
     }
     // Glass of index 1 is not there.
     let mut builder = Builder::new(Vec3::ZERO);
@@ -317,7 +316,7 @@ fn glass_from_inside_and_indices_of_one() {
     builder.quad(Vec3::new(-10.0, -10.0, -0.1), Vec3::Y * 20.0, Vec3::X * 20.0, material);
     builder.quad(Vec3::new(-50.0, -50.0, -1.0), Vec3::X * 100.0, Vec3::Y * 100.0, glow);
     let ray = [Vec3::new(3.0, 0.5, 1.0), Vec3::ZERO];
-    row("slab of index 1 before a glow", measure(&gpu, &builder.build(), ray, 8, SAMPLES, Clone::clone), 1.0);
+    row("slab of index 1 before a glow", measure(&gpu, &builder.build(), ray, 8, SAMPLES, |_| {}), 1.0);
 }
 
 #[test]
@@ -333,16 +332,16 @@ fn roughness_and_albedo_at_their_ends() {
     let ray = [Vec3::new(0.4, 0.3, 4.0), Vec3::new(0.4, 0.3, 0.0)];
     for roughness in [0.0, 1e-4, 1e-2] {
         let metal = Material { roughness, ..Default::default() };
-        let found = measure(&gpu, &ball(metal), ray, 4, SAMPLES, Clone::clone);
+        let found = measure(&gpu, &ball(metal), ray, 4, SAMPLES, |_| {});
         row(&format!("white metal, roughness {roughness}"), found, 1.0);
     }
     let dielectric =
         Material { ior: 1.0, metallic: 0.0, base_color: Vec3::splat(0.5).extend(1.0), ..Default::default() };
-    row("dielectric of index 1", measure(&gpu, &ball(dielectric), ray, 4, SAMPLES, Clone::clone), 0.5);
-    let black = measure(&gpu, &ball(lambert(Vec3::ZERO)), ray, 4, SAMPLES, Clone::clone);
+    row("dielectric of index 1", measure(&gpu, &ball(dielectric), ray, 4, SAMPLES, |_| {}), 0.5);
+    let black = measure(&gpu, &ball(lambert(Vec3::ZERO)), ray, 4, SAMPLES, |_| {});
     assert_eq!((black.mean, black.error), (0.0, 0.0), "black is black");
     for (case, albedo, expected) in [("albedo 2 counts as 1", 2.0, 1.0), ("albedo -1 counts as 0", -1.0, 0.0)] {
-        let found = measure(&gpu, &ball(lambert(Vec3::splat(albedo))), ray, 4, SAMPLES, Clone::clone);
+        let found = measure(&gpu, &ball(lambert(Vec3::splat(albedo))), ray, 4, SAMPLES, |_| {});
         assert!((found.mean - expected).abs() <= 3.0 * found.error + ROUNDING, "{case}: {found:?}");
     }
 }
@@ -366,7 +365,7 @@ fn emitters_of_every_strength() {
     let ray = [Vec3::new(6.0, 1.0, 0.0), Vec3::ZERO];
     let factor = 0.7 * 4.0 * corner_factor(1.0, 1.0, 1.5);
     for (radiance, more) in [(1e-6f32, 0.0), (1.0, 0.0), (1e9, 0.0), (1.0, 1e6)] {
-        let found = measure(&gpu, &lit_by(radiance, more), ray, 1, 4 * SAMPLES, Clone::clone);
+        let found = measure(&gpu, &lit_by(radiance, more), ray, 1, 4 * SAMPLES, |_| {});
         let beside = if more > 0.0 { format!(" beside one of {more:.0e}") } else { String::new() };
         row(&format!("emitter of {radiance:.0e}{beside}"), found, f64::from(radiance) * factor);
     }
@@ -409,7 +408,7 @@ fn four_thousand_bounces_between_mirrors() {
         builder.build()
     };
     let ray = [Vec3::new(0.1, -0.2, 0.3), Vec3::new(0.7, 0.5, -0.4)];
-    let found = measure(&gpu, &mirrors(1.0, 1.0 / 4097.0), ray, 4096, 256, Clone::clone);
+    let found = measure(&gpu, &mirrors(1.0, 1.0 / 4097.0), ray, 4096, 256, |_| {});
     row("4096 bounces between white mirrors", found, 1.0);
     assert_eq!(found.statistics.segments, 256 * 4097, "no path ended early");
 }
@@ -472,8 +471,11 @@ fn an_offset_that_is_too_small_is_noticed() {
     let offset = "s.position_error = magnitude * 1.9073486e-6;";
     for log2 in [-19i32, -21, -23, -25, -27] {
         let planted = format!("s.position_error = magnitude * {:e};", 4.0 * 2f64.powi(log2));
-        let found = measure(&gpu, &scene, ray, BOUNCES, SAMPLES, |sources: &ShaderSources| {
-            if log2 == -21 { sources.clone() } else { exchanged(sources, "scene::surface", &[(offset, &planted)]) }
+        let found = measure(&gpu, &scene, ray, BOUNCES, SAMPLES, |renderer| {
+            if log2 != -21 {
+                let sources = exchanged(renderer.shaders(), "scene::surface", &[(offset, &planted)]);
+                renderer.set_shaders(sources).unwrap();
+            }
         });
         let relative = found.mean / closed_furnace() - 1.0;
         eprintln!(

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use glam::Vec3;
+
 use crate::scene::{AlphaMode, Environment, Material, PunctualLight, Scene};
 
 macro_rules! features {
@@ -42,14 +44,40 @@ features! {
     SunDiscs = "SUN_DISCS",
     /// The environment is an image and is sampled; a constant one is left to BSDF sampling.
     EnvironmentImage = "ENVIRONMENT_IMAGE",
+    /// Some material mirrors: metal, or a dielectric with a specular lobe.
+    Specular = "SPECULAR",
+    /// Some material has a clearcoat.
+    Clearcoat = "CLEARCOAT",
+    /// Some material has a sheen.
+    Sheen = "SHEEN",
+    /// Some material's highlights are stretched.
+    Anisotropy = "ANISOTROPY",
+    /// Some material is under a thin film.
+    Iridescence = "IRIDESCENCE",
+    /// Some material lets scattered light through.
+    DiffuseTransmission = "DIFFUSE_TRANSMISSION",
     /// Some material transmits light.
     Transmission = "TRANSMISSION",
+    /// Some material is a clear sheet, and there is light to sample behind it: shadow rays pass it.
+    ClearSheets = "CLEAR_SHEETS",
     /// Some transmissive material is a solid that refracts.
     Solid = "SOLID",
+    /// Some solid absorbs light.
+    Absorption = "ABSORPTION",
+    /// Some solid refracts red, green and blue differently.
+    Dispersion = "DISPERSION",
     /// Some material is unlit.
     Unlit = "UNLIT",
     /// The film is a perspective image instead of a panorama.
     PerspectiveFilm = "PERSPECTIVE_FILM",
+    /// For comparisons: what lights can be sampled is not left to BSDF sampling ([`SamplingTechnique::Lights`]).
+    ///
+    /// [`SamplingTechnique::Lights`]: crate::renderer::SamplingTechnique::Lights
+    LightSamplingOnly = "LIGHT_SAMPLING_ONLY",
+    /// For comparisons: what BSDF sampling can hit is not sampled as a light ([`SamplingTechnique::Bsdf`]).
+    ///
+    /// [`SamplingTechnique::Bsdf`]: crate::renderer::SamplingTechnique::Bsdf
+    BsdfSamplingOnly = "BSDF_SAMPLING_ONLY",
 }
 
 /// A set of [`Feature`]s.
@@ -57,9 +85,10 @@ features! {
 pub struct SceneFeatures(u32);
 
 impl SceneFeatures {
-    /// The set that contains every feature.
+    /// The set that contains every feature that a scene or a film may need: all but those for comparisons.
     pub fn all() -> Self {
-        Feature::ALL.iter().copied().collect()
+        let for_comparisons = [Feature::LightSamplingOnly, Feature::BsdfSamplingOnly];
+        Feature::ALL.iter().copied().filter(|feature| !for_comparisons.contains(feature)).collect()
     }
 
     /// True when the set contains the feature.
@@ -78,10 +107,14 @@ impl SceneFeatures {
         let used = used_materials(scene);
         let any = |test: fn(&Material) -> bool| used.iter().any(|m| test(m));
         let emits = any(|m| m.emission.max_element() > 0.0 && !m.unlit);
+        let samples_light = emits || !scene.lights.is_empty() || matches!(scene.environment, Environment::Image { .. });
         Self::default()
             .with(Feature::Alpha, any(|m| m.alpha_mode != AlphaMode::Opaque))
             .with(Feature::Textures, any(has_textures))
-            .with(Feature::NormalMaps, any(|m| m.normal_texture.is_some()))
+            .with(
+                Feature::NormalMaps,
+                any(|m| m.normal_texture.is_some() || m.clearcoat > 0.0 && m.clearcoat_normal_texture.is_some()),
+            )
             .with(
                 Feature::SpecularTextures,
                 any(|m| m.specular_texture.is_some() || m.specular_color_texture.is_some()),
@@ -90,8 +123,20 @@ impl SceneFeatures {
             .with(Feature::Lights, emits || !scene.lights.is_empty())
             .with(Feature::SunDiscs, scene.lights.iter().any(PunctualLight::is_disc))
             .with(Feature::EnvironmentImage, matches!(scene.environment, Environment::Image { .. }))
+            .with(Feature::Specular, any(Material::is_specular))
+            .with(Feature::Clearcoat, any(|m| m.clearcoat > 0.0))
+            .with(Feature::Sheen, any(|m| m.sheen_color.max_element() > 0.0))
+            .with(Feature::Anisotropy, any(|m| m.anisotropy > 0.0 && m.is_specular()))
+            .with(Feature::Iridescence, any(|m| m.iridescence > 0.0))
+            .with(Feature::DiffuseTransmission, any(|m| m.diffuse_transmission > 0.0))
             .with(Feature::Transmission, any(|m| m.transmission > 0.0))
-            .with(Feature::Solid, any(|m| m.transmission > 0.0 && m.thickness > 0.0))
+            .with(Feature::ClearSheets, samples_light && any(Material::is_clear_sheet))
+            .with(Feature::Solid, any(|m| m.transmission > 0.0 && m.is_solid()))
+            .with(
+                Feature::Absorption,
+                any(|m| m.is_solid() && m.attenuation_distance.is_finite() && m.attenuation_color != Vec3::ONE),
+            )
+            .with(Feature::Dispersion, any(|m| m.dispersion > 0.0 && m.transmission > 0.0 && m.is_solid()))
             .with(Feature::Unlit, any(|m| m.unlit))
     }
 }
@@ -128,6 +173,16 @@ fn has_textures(m: &Material) -> bool {
         m.specular_texture,
         m.specular_color_texture,
         m.transmission_texture,
+        m.diffuse_transmission_texture,
+        m.diffuse_transmission_color_texture,
+        m.clearcoat_texture,
+        m.clearcoat_roughness_texture,
+        m.clearcoat_normal_texture,
+        m.sheen_color_texture,
+        m.sheen_roughness_texture,
+        m.anisotropy_texture,
+        m.iridescence_texture,
+        m.iridescence_thickness_texture,
     ]
     .iter()
     .any(Option::is_some)

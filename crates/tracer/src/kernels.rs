@@ -30,6 +30,14 @@ pub const TEXEL_PAGE_BITS: u32 = 11;
 /// Dimensions taken from the Sobol sequence: pixel, place in it, and the first bounce's six. Later ones are hashed: the
 /// matrix products of 32 dimensions took a sixth of the time on lavapipe.
 pub const SOBOL_DIMENSIONS: u32 = 10;
+/// Entries of the tables of rough lobes' albedos along the angle.
+pub const ALBEDO_COLUMNS: u32 = 64;
+/// Entries along the roughness; the least roughness of sheen, 0.1, is one of them.
+pub const ALBEDO_ROWS: u32 = 31;
+/// Entries of the tables of rough glass along angle and roughness.
+pub const GLASS_SIZE: u32 = 20;
+/// Entries along the index.
+pub const GLASS_LAYERS: u32 = 33;
 /// Russian roulette starts at this bounce.
 pub const FIRST_ROULETTE_BOUNCE: u32 = 4;
 
@@ -46,8 +54,16 @@ const MODULES: &[(&str, &str)] = &[
     ("scene::texture", include_str!("../../../shaders/scene/texture.wesl")),
     ("scene::alpha", include_str!("../../../shaders/scene/alpha.wesl")),
     ("scene::surface", include_str!("../../../shaders/scene/surface.wesl")),
+    ("shading::fresnel", include_str!("../../../shaders/shading/fresnel.wesl")),
+    ("shading::layers", include_str!("../../../shaders/shading/layers.wesl")),
+    ("shading::lobes", include_str!("../../../shaders/shading/lobes.wesl")),
+    ("shading::local", include_str!("../../../shaders/shading/local.wesl")),
     ("shading::microfacet", include_str!("../../../shaders/shading/microfacet.wesl")),
+    ("shading::normal", include_str!("../../../shaders/shading/normal.wesl")),
+    ("shading::sheen", include_str!("../../../shaders/shading/sheen.wesl")),
+    ("shading::tables", include_str!("../../../shaders/shading/tables.wesl")),
     ("shading::bsdf", include_str!("../../../shaders/shading/bsdf.wesl")),
+    ("light::weights", include_str!("../../../shaders/light/weights.wesl")),
     ("light::environment", include_str!("../../../shaders/light/environment.wesl")),
     ("light::emitters", include_str!("../../../shaders/light/emitters.wesl")),
     ("path::trace", include_str!("../../../shaders/path/trace.wesl")),
@@ -248,6 +264,10 @@ fn constants_module(c: &KernelConstants) -> String {
         ("TILE_SIZE", TILE_SIZE),
         ("FILM_WORDS", FILM_WORDS),
         ("TEXEL_PAGE_BITS", TEXEL_PAGE_BITS),
+        ("ALBEDO_COLUMNS", ALBEDO_COLUMNS),
+        ("ALBEDO_ROWS", ALBEDO_ROWS),
+        ("GLASS_SIZE", GLASS_SIZE),
+        ("GLASS_LAYERS", GLASS_LAYERS),
         ("FIRST_ROULETTE_BOUNCE", FIRST_ROULETTE_BOUNCE),
         ("SOBOL_DIMENSIONS", SOBOL_DIMENSIONS),
         ("STACK_SIZE", c.stack_size.max(1)),

@@ -67,6 +67,18 @@ pub enum SequenceKind {
     Independent,
 }
 
+/// How light is found that both light sampling and BSDF sampling can reach. All three give the same picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum SamplingTechnique {
+    /// Both, weighted by the power heuristic: what one should use.
+    #[default]
+    Both,
+    /// Light sampling alone, for comparisons.
+    Lights,
+    /// BSDF sampling alone, for comparisons.
+    Bsdf,
+}
+
 /// Fixed at creation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RendererOptions {
@@ -152,6 +164,7 @@ pub struct Renderer {
     distribution: Distribution,
     pixel_list: wgpu::Buffer,
     sources: Arc<ShaderSources>,
+    technique: SamplingTechnique,
     pipelines: PipelineCache,
     bound: Option<BoundKernels>,
     /// One per slab of the film: they differ in the slab alone.
@@ -200,6 +213,7 @@ impl Renderer {
             pose: FilmPose::default(),
             distribution,
             sources,
+            technique: SamplingTechnique::default(),
             pipelines: PipelineCache::default(),
             bound: None,
             params,
@@ -321,6 +335,19 @@ impl Renderer {
         let result = if self.scene.is_some() { self.bind() } else { Ok(()) };
         if result.is_err() {
             self.sources = before;
+        }
+        result
+    }
+
+    /// Finds light by other means from now on. The film goes on.
+    ///
+    /// # Errors
+    /// When the kernels do not compose or compile; the last technique then stays.
+    pub fn set_technique(&mut self, technique: SamplingTechnique) -> Result<(), RenderError> {
+        let before = std::mem::replace(&mut self.technique, technique);
+        let result = if self.scene.is_some() { self.bind() } else { Ok(()) };
+        if result.is_err() {
+            self.technique = before;
         }
         result
     }
@@ -483,8 +510,15 @@ impl Renderer {
     pub fn key(&self, kernel: Kernel) -> KernelKey {
         let perspective = matches!(self.options.film.mapping, FilmMapping::Perspective { .. });
         let scene = self.scene.as_ref();
-        let features =
-            if kernel == Kernel::Trace { scene.map(|s| s.features).unwrap_or_default() } else { Default::default() };
+        let features = if kernel == Kernel::Trace {
+            scene
+                .map(|s| s.features)
+                .unwrap_or_default()
+                .with(Feature::LightSamplingOnly, self.technique == SamplingTechnique::Lights)
+                .with(Feature::BsdfSamplingOnly, self.technique == SamplingTechnique::Bsdf)
+        } else {
+            Default::default()
+        };
         KernelKey {
             kernel,
             features: features.with(Feature::PerspectiveFilm, perspective),

@@ -302,6 +302,25 @@ impl Default for Material {
     }
 }
 
+impl Material {
+    /// True for a volume that light enters: it refracts or scatters at its surface and absorbs inside.
+    pub fn is_solid(&self) -> bool {
+        self.thickness > 0.0 && (self.transmission > 0.0 || self.diffuse_transmission > 0.0)
+    }
+
+    /// True for a smooth transmissive surface without thickness: shadow rays pass it in straight lines, and lose what it stops.
+    pub fn is_clear_sheet(&self) -> bool {
+        // The square of the roughness counts as 0 below 1e-3 in the shaders.
+        self.transmission > 0.0 && !self.is_solid() && self.roughness * self.roughness < 1e-3
+    }
+
+    /// True when something is mirrored: metal, or a dielectric whose specular reflectance is not 0.
+    pub fn is_specular(&self) -> bool {
+        let dielectric = self.specular > 0.0 || self.transmission > 0.0 || self.iridescence > 0.0;
+        self.metallic > 0.0 || dielectric
+    }
+}
+
 /// What kind of punctual light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PunctualKind {

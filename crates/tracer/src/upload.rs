@@ -13,6 +13,7 @@ use crate::{
     scene::Scene,
 };
 
+mod albedo;
 mod alias;
 mod environment;
 mod geometry;
@@ -93,8 +94,8 @@ pub struct SceneOnGpu {
 pub struct SceneBindings {
     /// Storage buffers, binding 0 to 7.
     pub buffers: [wgpu::Buffer; 8],
-    /// Textures, binding 8 to 11.
-    pub textures: [wgpu::TextureView; 4],
+    /// Textures, binding 8 to 12.
+    pub textures: [wgpu::TextureView; 5],
 }
 
 /// Uploads buffers and keeps count.
@@ -140,6 +141,8 @@ impl SceneOnGpu {
         let (texels, offsets) = texels::TexelHeap::upload(gpu, &scene.textures, &mut uploader.bytes)?;
         let (materials, slots) = materials::encode(scene, &offsets);
         let environment = environment::EnvironmentOnGpu::build(gpu, &scene.environment, &mut uploader.bytes)?;
+        let features = SceneFeatures::of(scene);
+        let lobe_tables = albedo::upload(gpu, features, &mut uploader.bytes);
         let buffers = [
             uploader.storage("hierarchy nodes", &geometry.nodes)?,
             uploader.storage("triangle positions", &geometry.positions)?,
@@ -157,7 +160,7 @@ impl SceneOnGpu {
         let light_count = light_table.lights.len() as u32;
         let has_image = environment.cells_size[0] > 0;
         Ok(Self {
-            features: SceneFeatures::of(scene)
+            features: features
                 .with(Feature::Lights, light_count > 0)
                 .with(Feature::Instances, !geometry.is_single_level),
             constants: KernelConstants {
@@ -167,7 +170,7 @@ impl SceneOnGpu {
             },
             bindings: SceneBindings {
                 buffers,
-                textures: [texels.srgb, texels.linear, environment.image, environment.cells],
+                textures: [texels.srgb, texels.linear, environment.image, environment.cells, lobe_tables],
             },
             light_count,
             environment_probability: match (has_image, light_count > 0) {

@@ -17,17 +17,21 @@ use node::NodeLimits;
 pub(super) use node::{Animation, Channel, ChannelPath, Interpolation, Local, Node, unit_or_identity};
 pub(super) use storage::{Accessor, Buffer, Component, Compressed, CompressedMode, Filter, Sparse, View};
 
-/// Extensions that take effect here (or need none to be right), and may therefore be required. Clearcoat, sheen, anisotropy,
-/// iridescence, dispersion and diffuse transmission are read into [`crate::scene::Material`] but not shaded, so they are not
-/// among them and are reported.
+/// Extensions that take effect here (or need none to be right), and may therefore be required.
 pub(super) const SUPPORTED_EXTENSIONS: &[&str] = &[
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
     "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_diffuse_transmission",
+    "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
+    "KHR_materials_iridescence",
     "KHR_materials_ior",
     "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen",
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",

@@ -148,6 +148,30 @@ shared! {
         specular_texture: u32,
         specular_color_texture: u32,
         transmission_texture: u32,
+        sheen_color: [f32; 3],
+        sheen_roughness: f32,
+        diffuse_transmission_color: [f32; 3],
+        diffuse_transmission: f32,
+        anisotropy_direction: [f32; 2],
+        iridescence_thickness_nm: [f32; 2],
+        anisotropy: f32,
+        clearcoat: f32,
+        clearcoat_roughness: f32,
+        clearcoat_normal_scale: f32,
+        iridescence: f32,
+        iridescence_ior: f32,
+        dispersion: f32,
+        sheen_color_texture: u32,
+        sheen_roughness_texture: u32,
+        diffuse_transmission_texture: u32,
+        diffuse_transmission_color_texture: u32,
+        anisotropy_texture: u32,
+        clearcoat_texture: u32,
+        clearcoat_roughness_texture: u32,
+        clearcoat_normal_texture: u32,
+        iridescence_texture: u32,
+        iridescence_thickness_texture: u32,
+        pad_0: [u32; 3],
     }
 
     /// A material's reference to a texture.
@@ -239,6 +263,7 @@ pub mod codes {
     pub const MATERIAL_ALPHA_BLEND: u32 = 4;
     pub const MATERIAL_UNLIT: u32 = 8;
     pub const MATERIAL_SOLID: u32 = 16;
+    pub const MATERIAL_CLEAR_SHEET: u32 = 32;
     pub const TEXTURE_LINEAR_FILTER: u32 = 1;
     pub const TEXTURE_UV1: u32 = 2;
     pub const WRAP_REPEAT: u32 = 0;

@@ -181,24 +181,25 @@ fn split(scene: &Scene) -> (Vec<u32>, Vec<u32>) {
 }
 
 fn own_piece(scene: &Scene, mesh: u32) -> Piece {
-    let has_alpha = scene.instances.iter().any(|i| i.mesh == mesh && has_alpha(scene, i));
+    let passes_light = scene.instances.iter().any(|i| i.mesh == mesh && passes_light(scene, i));
     let mesh = &*scene.meshes[mesh as usize];
     Piece {
         hash: mesh.hash,
         positions: mesh.positions.clone(),
         triangles: mesh.triangles.clone(),
         vertices: vertices::encode(mesh, None, codes::NONE).collect(),
-        numbers: numbers(mesh, has_alpha),
+        numbers: numbers(mesh, passes_light),
     }
 }
 
-fn numbers(mesh: &Mesh, has_alpha: bool) -> Vec<u32> {
-    let flag = if has_alpha { codes::TRIANGLE_ALPHA } else { 0 };
+fn numbers(mesh: &Mesh, passes_light: bool) -> Vec<u32> {
+    let flag = if passes_light { codes::TRIANGLE_ALPHA } else { 0 };
     (0..mesh.triangles.len() as u32).map(|number| number | flag).collect()
 }
 
-fn has_alpha(scene: &Scene, instance: &Instance) -> bool {
-    scene.materials[instance.material as usize].alpha_mode != AlphaMode::Opaque
+fn passes_light(scene: &Scene, instance: &Instance) -> bool {
+    let material = &scene.materials[instance.material as usize];
+    material.alpha_mode != AlphaMode::Opaque || material.is_clear_sheet()
 }
 
 /// All fixed instances in world space; their entries in the instance table follow the `first_part` others.
@@ -221,7 +222,7 @@ fn static_piece(scene: &Scene, fixed: &[u32], first_part: u32) -> Piece {
                     .map(|&[a, b, c]| if mirrored { [a, c, b] } else { [a, b, c] })
                     .collect(),
                 vertices: vertices::encode(mesh, Some(&instance.world_from_mesh), first_part + part as u32).collect(),
-                numbers: numbers(mesh, has_alpha(scene, instance)),
+                numbers: numbers(mesh, passes_light(scene, instance)),
             }
         })
         .collect();

@@ -37,7 +37,8 @@ fn encode_one(m: &Material, mut slot: impl FnMut(Option<&TextureRef>) -> u32) ->
         flags: alpha
             | flag(m.double_sided, codes::MATERIAL_DOUBLE_SIDED)
             | flag(m.unlit, codes::MATERIAL_UNLIT)
-            | flag(m.thickness > 0.0, codes::MATERIAL_SOLID),
+            | flag(m.is_solid(), codes::MATERIAL_SOLID)
+            | flag(m.is_clear_sheet(), codes::MATERIAL_CLEAR_SHEET),
         specular_color: m.specular_color.to_array(),
         specular: m.specular,
         absorption: absorption(m).to_array(),
@@ -54,6 +55,30 @@ fn encode_one(m: &Material, mut slot: impl FnMut(Option<&TextureRef>) -> u32) ->
         specular_texture: slot(m.specular_texture.as_ref()),
         specular_color_texture: slot(m.specular_color_texture.as_ref()),
         transmission_texture: slot(m.transmission_texture.as_ref()),
+        sheen_color: m.sheen_color.to_array(),
+        sheen_roughness: m.sheen_roughness,
+        diffuse_transmission_color: m.diffuse_transmission_color.to_array(),
+        diffuse_transmission: m.diffuse_transmission,
+        anisotropy_direction: [m.anisotropy_rotation.cos(), m.anisotropy_rotation.sin()],
+        iridescence_thickness_nm: m.iridescence_thickness_nm,
+        anisotropy: m.anisotropy,
+        clearcoat: m.clearcoat,
+        clearcoat_roughness: m.clearcoat_roughness,
+        clearcoat_normal_scale: m.clearcoat_normal_scale,
+        iridescence: m.iridescence,
+        iridescence_ior: m.iridescence_ior,
+        dispersion: m.dispersion,
+        sheen_color_texture: slot(m.sheen_color_texture.as_ref()),
+        sheen_roughness_texture: slot(m.sheen_roughness_texture.as_ref()),
+        diffuse_transmission_texture: slot(m.diffuse_transmission_texture.as_ref()),
+        diffuse_transmission_color_texture: slot(m.diffuse_transmission_color_texture.as_ref()),
+        anisotropy_texture: slot(m.anisotropy_texture.as_ref()),
+        clearcoat_texture: slot(m.clearcoat_texture.as_ref()),
+        clearcoat_roughness_texture: slot(m.clearcoat_roughness_texture.as_ref()),
+        clearcoat_normal_texture: slot(m.clearcoat_normal_texture.as_ref()),
+        iridescence_texture: slot(m.iridescence_texture.as_ref()),
+        iridescence_thickness_texture: slot(m.iridescence_thickness_texture.as_ref()),
+        pad_0: [0; 3],
     }
 }
 
