@@ -1,9 +1,14 @@
 //! What the benches and reports share.
 
-use std::sync::Arc;
+use std::{path::Path, sync::Arc};
 
-use glam::{Affine3A, DVec3, Vec3};
-use tracer::scene::{ContentHash, Environment, Instance, Material, Mesh, Scene};
+use glam::{Affine3A, DVec3, Quat, Vec3};
+use tracer::{
+    builtin,
+    import::{ImportError, ImportOptions, load_gltf},
+    renderer::FilmPose,
+    scene::{ContentHash, Environment, Instance, Material, Mesh, Scene},
+};
 
 /// A scene of one far triangle under a constant sky: almost nothing but ray generation.
 pub fn one_triangle() -> Scene {
@@ -36,5 +41,36 @@ pub fn one_triangle() -> Scene {
         cameras: Vec::new(),
         environment: Environment::Constant(Vec3::ONE),
         origin_in_file: DVec3::ZERO,
+    }
+}
+
+/// A scene as the reports show it, and where its film is.
+#[derive(Debug)]
+pub struct Subject {
+    /// The file's name without extension, or `built-in`.
+    pub name: String,
+    /// With the background of the reference images: 1 where the scene is open.
+    pub scene: Scene,
+    /// At the reference images' camera: 0, or 2 for bmw and sponza.
+    pub pose: FilmPose,
+}
+
+impl Subject {
+    /// Reads a file, or the built-in scene.
+    ///
+    /// # Errors
+    /// When it cannot be read.
+    pub fn open(file: Option<&Path>) -> Result<Self, ImportError> {
+        let (mut scene, _) = match file {
+            Some(file) => load_gltf(file, &ImportOptions::default())?,
+            None => builtin::scene()?,
+        };
+        let name = file.and_then(Path::file_stem).map_or("built-in".into(), |s| s.to_string_lossy().into_owned());
+        if ["bmw", "sibenik", "sibenik_lambert", "sponza"].contains(&name.as_str()) {
+            scene.environment = Environment::Constant(Vec3::ONE);
+        }
+        let camera = if ["bmw", "sponza"].contains(&name.as_str()) { 2 } else { 0 };
+        let position = scene.cameras.get(camera).map_or(Vec3::ZERO, |camera| camera.position);
+        Ok(Self { name, scene, pose: FilmPose { position, world_from_film: Quat::IDENTITY } })
     }
 }

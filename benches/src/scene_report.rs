@@ -7,17 +7,15 @@
 
 use std::{path::Path, process::ExitCode, sync::Arc, time::Instant};
 
+use fovea_benches::Subject;
 use fovea_sampler::{Angle, Geometry, Inverse, RadialDistribution, Reddy2001};
 use glam::{Quat, Vec3};
 use serde_json::{Value, json};
 use tracer::{
-    builtin,
     distribution::{Distribution, Gaze, View},
     gpu::{AdapterSelect, Gpu},
-    import::{ImportOptions, load_gltf},
     provenance::Provenance,
-    renderer::{FIRST_BATCH, FilmPose, Renderer, RendererOptions, StopCondition},
-    scene::{Environment, Scene},
+    renderer::{FIRST_BATCH, Renderer, RendererOptions, StopCondition},
     view::{DebugView, ToneMap, ViewProjection, ViewSettings},
 };
 
@@ -56,23 +54,15 @@ fn run(args: &[String]) -> Result<(), AnyError> {
 
 fn measure(gpu: &Gpu, file: Option<&Path>, seconds: f64) -> Result<Value, AnyError> {
     let started = Instant::now();
-    let (mut scene, _) = match file {
-        Some(file) => load_gltf(file, &ImportOptions::default())?,
-        None => builtin::scene()?,
-    };
+    let Subject { name: stem, scene, pose } = Subject::open(file)?;
     let import = started.elapsed().as_secs_f64();
-    let stem = file.and_then(Path::file_stem).map_or("built-in".into(), |s| s.to_string_lossy().into_owned());
     eprintln!("{stem} ...");
-    if ["bmw", "sibenik", "sibenik_lambert", "sponza"].contains(&stem.as_str()) {
-        scene.environment = Environment::Constant(Vec3::ONE);
-    }
-    let camera = if ["bmw", "sponza"].contains(&stem.as_str()) { 2 } else { 0 };
     let distribution = RadialDistribution::new(Reddy2001, Geometry::Sphere, Angle::from_degrees(80.0), 0.002)?;
     let inverse = Arc::new(Inverse::default_for(&distribution));
     let foveated = Distribution::foveated(Gaze::Scene { direction: Vec3::NEG_Z }, None, inverse.clone());
     let mut renderer = Renderer::new(gpu, &RendererOptions::default(), foveated.clone())?;
     let report = renderer.set_scene(&scene)?;
-    renderer.set_pose(pose(&scene, camera));
+    renderer.set_pose(pose);
     renderer.trace(FIRST_BATCH)?;
     present(gpu, &mut renderer)?;
     let first_picture = started.elapsed().as_secs_f64();
@@ -100,11 +90,6 @@ fn measure(gpu: &Gpu, file: Option<&Path>, seconds: f64) -> Result<Value, AnyErr
         row[format!("{mode}_mean_path_length")] = (statistics.segments as f64 / statistics.samples as f64).into();
     }
     Ok(row)
-}
-
-fn pose(scene: &Scene, camera: usize) -> FilmPose {
-    let position = scene.cameras.get(camera).map_or(Vec3::ZERO, |camera| camera.position);
-    FilmPose { position, world_from_film: Quat::IDENTITY }
 }
 
 /// Presents once to a texture of 1280x720 and waits.

@@ -80,6 +80,20 @@ features! {
     BsdfSamplingOnly = "BSDF_SAMPLING_ONLY",
 }
 
+impl Feature {
+    /// True for what a kernel may contain without need: materials and lights. The others change what is bound or traced.
+    pub const fn may_be_spare(self) -> bool {
+        !matches!(
+            self,
+            Self::Instances
+                | Self::EnvironmentImage
+                | Self::PerspectiveFilm
+                | Self::LightSamplingOnly
+                | Self::BsdfSamplingOnly
+        )
+    }
+}
+
 /// A set of [`Feature`]s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct SceneFeatures(u32);
@@ -100,6 +114,12 @@ impl SceneFeatures {
     #[must_use]
     pub const fn with(self, feature: Feature, present: bool) -> Self {
         if present { Self(self.0 | (1 << feature as u32)) } else { self }
+    }
+
+    /// The features of both sets.
+    #[must_use]
+    pub const fn union(self, other: Self) -> Self {
+        Self(self.0 | other.0)
     }
 
     /// What the visible part of a scene needs.

@@ -12,7 +12,7 @@ use batch::BoundKernels;
 
 use crate::{
     distribution::Distribution,
-    features::Feature,
+    features::{Feature, SceneFeatures},
     film::{Film, FilmMapping, FilmOptions, FilmSnapshot, ReadError},
     gpu::Gpu,
     kernels::{
@@ -165,6 +165,7 @@ pub struct Renderer {
     pixel_list: wgpu::Buffer,
     sources: Arc<ShaderSources>,
     technique: SamplingTechnique,
+    spare_features: SceneFeatures,
     pipelines: PipelineCache,
     bound: Option<BoundKernels>,
     /// One per slab of the film: they differ in the slab alone.
@@ -214,6 +215,7 @@ impl Renderer {
             distribution,
             sources,
             technique: SamplingTechnique::default(),
+            spare_features: SceneFeatures::default(),
             pipelines: PipelineCache::default(),
             bound: None,
             params,
@@ -348,6 +350,21 @@ impl Renderer {
         let result = if self.scene.is_some() { self.bind() } else { Ok(()) };
         if result.is_err() {
             self.technique = before;
+        }
+        result
+    }
+
+    /// Compiles these features in although the scene does not need them: what a flag costs is measured so. Only features of
+    /// materials and lights ([`Feature::may_be_spare`]) have an effect. The film goes on.
+    ///
+    /// # Errors
+    /// When the kernels do not compose or compile; the last ones then stay.
+    pub fn set_spare_features(&mut self, features: SceneFeatures) -> Result<(), RenderError> {
+        let allowed = Feature::ALL.iter().copied().filter(|f| f.may_be_spare() && features.contains(*f)).collect();
+        let before = std::mem::replace(&mut self.spare_features, allowed);
+        let result = if self.scene.is_some() { self.bind() } else { Ok(()) };
+        if result.is_err() {
+            self.spare_features = before;
         }
         result
     }
@@ -514,6 +531,7 @@ impl Renderer {
             scene
                 .map(|s| s.features)
                 .unwrap_or_default()
+                .union(self.spare_features)
                 .with(Feature::LightSamplingOnly, self.technique == SamplingTechnique::Lights)
                 .with(Feature::BsdfSamplingOnly, self.technique == SamplingTechnique::Bsdf)
         } else {
