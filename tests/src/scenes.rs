@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use glam::{Affine3A, DVec3, Vec2, Vec3, Vec4};
 use tracer::scene::{
-    ContentHash, Environment, Instance, Material, Mesh, PunctualLight, Scene, TexelEncoding, Texture, TextureRef,
-    WrapMode,
+    ContentHash, Environment, EnvironmentImage, Instance, Material, Mesh, PunctualLight, Scene, TexelEncoding, Texture,
+    TextureRef, WrapMode,
 };
 
 /// A scene under construction.
@@ -20,6 +20,14 @@ pub fn lambert(albedo: Vec3) -> Material {
 /// A black material that emits this radiance from its front.
 pub fn emitter(radiance: Vec3) -> Material {
     Material { emission: radiance, ..lambert(Vec3::ZERO) }
+}
+
+/// An environment image of one radiance everywhere: unlike a constant environment it is sampled as a light.
+pub fn even_image(radiance: f32) -> Environment {
+    let pixels = vec![[radiance; 3]; 16 * 8];
+    let hash = ContentHash::of(&[bytemuck::cast_slice(&pixels)]);
+    let image = Arc::new(EnvironmentImage { width: 16, height: 8, pixels, hash });
+    Environment::Image { image, rotation_deg: 20.0, intensity: 1.0 }
 }
 
 impl Builder {

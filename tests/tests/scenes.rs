@@ -6,7 +6,7 @@ use std::{f64::consts::PI, sync::Arc};
 
 use fovea_tests::{
     device, pencil,
-    scenes::{Builder, emitter, lambert},
+    scenes::{Builder, emitter, even_image, lambert},
 };
 use glam::{Affine3A, Quat, Vec3};
 use tracer::{
@@ -14,7 +14,7 @@ use tracer::{
     film::FilmOptions,
     gpu::Gpu,
     renderer::{FilmPose, Renderer, RendererOptions, SamplingTechnique},
-    scene::{ContentHash, Environment, EnvironmentImage, Material, PunctualKind, PunctualLight, Scene},
+    scene::{Material, PunctualKind, PunctualLight, Scene},
 };
 
 const SAMPLES: u64 = 1 << 17;
@@ -159,10 +159,7 @@ fn a_sphere_in_a_constant_environment_by_each_way_of_sampling() {
     let sphere = builder.sphere(8);
     builder.place(sphere, material, Affine3A::IDENTITY);
     let mut scene = builder.build();
-    let pixels = vec![[0.5; 3]; 16 * 8];
-    let hash = ContentHash::of(&[bytemuck::cast_slice(&pixels)]);
-    let image = Arc::new(EnvironmentImage { width: 16, height: 8, pixels, hash });
-    scene.environment = Environment::Image { image, rotation_deg: 20.0, intensity: 2.0 };
+    scene.environment = even_image(1.0);
     for (what, target) in [("front", Vec3::new(0.1, 0.05, 0.0)), ("rim", Vec3::new(0.0, 0.55, 0.76))] {
         let ray = [Vec3::new(5.0, 0.3, 0.2), target];
         assert_techniques_agree(&gpu, &format!("sphere, {what}"), &scene, ray, 1, 0.6);
@@ -262,6 +259,39 @@ fn a_sun_with_an_angular_size() {
             assert!((both.0 - by_bsdf.0).abs() <= 3.0 * f64::hypot(both.1, by_bsdf.1));
         }
     }
+}
+
+/// Light samples go where light comes from: not to a sky outside a closed room, hardly to a lamp under an open sky. The mean
+/// does not depend on it.
+#[test]
+fn light_samples_are_split_by_what_reaches_the_scene() {
+    let gpu = device::gpu();
+    let share = |scene: &Scene| {
+        let options = RendererOptions { film: FilmOptions::equirect(32, 16), ..Default::default() };
+        let mut renderer = Renderer::new(&gpu, &options, Distribution::omnidirectional(device::inverse())).unwrap();
+        renderer.set_scene(scene).unwrap().environment_share
+    };
+    let mut closed = Builder::new(Vec3::ZERO);
+    let wall = closed.material(lambert(Vec3::splat(0.5)));
+    closed.room(Vec3::NEG_ONE, Vec3::ONE, [wall; 6]);
+    let lamp = closed.material(emitter(Vec3::splat(5.0)));
+    closed.quad(Vec3::new(-0.3, 0.9, -0.3), Vec3::X * 0.6, Vec3::Z * 0.6, lamp);
+    let mut closed = closed.build();
+    closed.environment = even_image(100.0);
+    let mut open = Builder::new(Vec3::ZERO);
+    floor(&mut open, 0.7);
+    let lamp = open.material(emitter(Vec3::splat(0.3)));
+    open.quad(Vec3::new(-0.5, 1.5, -1.0), Vec3::X * 2.0, Vec3::Z * 3.0, lamp);
+    let mut open = open.build();
+    open.environment = even_image(1.0);
+    let shares = [share(&closed), share(&open)];
+    eprintln!("share of the environment: closed {:.3}, open {:.3}", shares[0], shares[1]);
+    assert!(shares[0] <= 0.11 && shares[1] >= 0.8, "{shares:?}");
+    let factor: f64 =
+        [(0.5, 1.0), (1.5, 1.0), (0.5, 2.0), (1.5, 2.0)].iter().map(|&(a, b)| corner_form_factor(a, b, 1.5)).sum();
+    // The lamp's back, which does not emit, hides as much sky as it lights.
+    let expected = 0.7 * (0.3 * factor + 1.0 - factor);
+    assert_is("a lamp under a sky", measure(&gpu, &open, [Vec3::new(6.0, 1.0, 0.0), Vec3::ZERO], 1), expected);
 }
 
 /// A clear sheet of half grey between lamps and floor halves their light, by every way of sampling; a sun shines through it.

@@ -147,31 +147,9 @@ pub fn choose(viewpoints: &[Viewpoint], choice: Option<&CameraChoice>) -> anyhow
     }
 }
 
-/// Corners of the box around all that is visible, metres; `None` without geometry.
-pub fn bounds(scene: &Scene) -> Option<(Vec3, Vec3)> {
-    let boxes: Vec<_> = scene
-        .meshes
-        .iter()
-        .map(|mesh| {
-            mesh.positions.iter().fold((Vec3::MAX, Vec3::MIN), |(low, high), &point| (low.min(point), high.max(point)))
-        })
-        .collect();
-    let visible = scene.instances.iter().filter(|instance| instance.visible);
-    let corners = visible.filter_map(|instance| {
-        let &(low, high) = boxes.get(instance.mesh as usize)?;
-        let corner =
-            |index: u32| Vec3::select(glam::BVec3::new(index & 1 > 0, index & 2 > 0, index & 4 > 0), high, low);
-        (low.x <= high.x)
-            .then(|| [0, 1, 2, 3, 4, 5, 6, 7].map(|index| instance.world_from_mesh.transform_point3(corner(index))))
-    });
-    let (low, high) =
-        corners.flatten().fold((Vec3::MAX, Vec3::MIN), |(low, high), point| (low.min(point), high.max(point)));
-    (low.x <= high.x).then_some((low, high))
-}
-
 /// A camera that sees the whole scene.
 fn framing(scene: &Scene) -> Viewpoint {
-    let (low, high) = bounds(scene).unwrap_or((Vec3::NEG_ONE, Vec3::ONE));
+    let (low, high) = scene.bounds().unwrap_or((Vec3::NEG_ONE, Vec3::ONE));
     let radius = (high - low).length().max(1e-6) * 0.5;
     let backwards = FRAMING_DIRECTION.normalize();
     let position = (low + high) * 0.5 + backwards * (radius / (DEFAULT_VFOV * 0.5).sin());
@@ -257,10 +235,10 @@ mod tests {
 
     #[test]
     fn bounds_are_those_of_what_is_visible() {
-        let (low, high) = bounds(&scene()).unwrap();
+        let (low, high) = scene().bounds().unwrap();
         assert!(low.distance(Vec3::splat(10.0)) < 1e-5 && high.distance(Vec3::splat(12.0)) < 1e-5);
         assert_eq!(triangles(&scene()), 1);
-        assert_eq!(bounds(&Scene { instances: vec![], ..scene() }), None);
+        assert_eq!(Scene { instances: vec![], ..scene() }.bounds(), None);
     }
 
     #[test]
@@ -269,7 +247,7 @@ mod tests {
         let found = viewpoints(&scene);
         assert_eq!(found.len(), 1);
         let view = View::along(found[0].rotation, found[0].vfov, 1.0);
-        let (low, high) = bounds(&scene).unwrap();
+        let (low, high) = scene.bounds().unwrap();
         for corner in [low, high, Vec3::new(low.x, high.y, low.z), (low + high) * 0.5] {
             let point = view.point_of((corner - found[0].position).normalize()).unwrap();
             assert!(point.abs().cmple(Vec2::ONE).all(), "{corner} at {point}");

@@ -7,6 +7,7 @@ use thiserror::Error;
 
 mod batch;
 mod generation;
+mod split;
 
 use batch::BoundKernels;
 
@@ -121,6 +122,8 @@ pub struct SceneReport {
     pub upload: UploadReport,
     /// Composing and compiling kernels, with a first dispatch that does nothing.
     pub kernel_compile_secs: f64,
+    /// Share of the light samples that go to the environment.
+    pub environment_share: f32,
 }
 
 /// What was traced since the last restart.
@@ -240,11 +243,16 @@ impl Renderer {
         if let Err(error) = self.bind().and_then(|()| self.warm_up()) {
             self.scene = before;
             self.bound = None;
+            if self.scene.is_some() {
+                self.bind()?;
+            }
             return Err(error);
         }
         let kernel_compile_secs = started.elapsed().as_secs_f64();
+        self.split_light_samples(scene)?;
+        let environment_share = self.scene.as_ref().map_or(0.0, |scene| scene.environment_probability);
         self.restart();
-        Ok(SceneReport { upload, kernel_compile_secs })
+        Ok(SceneReport { upload, kernel_compile_secs, environment_share })
     }
 
     /// Puts an empty film of another size or mapping in the place of the present one. What is shown meanwhile is the old

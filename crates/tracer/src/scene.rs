@@ -35,6 +35,32 @@ pub struct Scene {
     pub origin_in_file: DVec3,
 }
 
+impl Scene {
+    /// Corners of the box around what is visible; `None` when nothing is. Boxes of meshes are turned with their instances.
+    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
+        let boxes: Vec<_> = self
+            .meshes
+            .iter()
+            .map(|mesh| {
+                mesh.positions
+                    .iter()
+                    .fold((Vec3::MAX, Vec3::MIN), |(low, high), &point| (low.min(point), high.max(point)))
+            })
+            .collect();
+        let visible = self.instances.iter().filter(|instance| instance.visible);
+        let corners = visible.filter_map(|instance| {
+            let &(low, high) = boxes.get(instance.mesh as usize)?;
+            let corner =
+                |index: u32| Vec3::select(glam::BVec3::new(index & 1 > 0, index & 2 > 0, index & 4 > 0), high, low);
+            (low.x <= high.x)
+                .then(|| [0, 1, 2, 3, 4, 5, 6, 7].map(|index| instance.world_from_mesh.transform_point3(corner(index))))
+        });
+        let (low, high) =
+            corners.flatten().fold((Vec3::MAX, Vec3::MIN), |(low, high), point| (low.min(point), high.max(point)));
+        (low.x <= high.x).then_some((low, high))
+    }
+}
+
 /// An indexed triangle list in its own space.
 #[derive(Clone, Debug)]
 pub struct Mesh {

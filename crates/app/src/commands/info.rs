@@ -19,7 +19,7 @@ pub fn run(args: &InfoArgs) -> anyhow::Result<()> {
 }
 
 fn describe(scene: &Scene, report: &ImportReport) -> Value {
-    let (low, high) = session::bounds(scene).unwrap_or_default();
+    let (low, high) = scene.bounds().unwrap_or_default();
     json!({
         "scene": scene.name,
         "scene_hash": scene_hash(scene).to_string(),
@@ -44,7 +44,7 @@ fn describe(scene: &Scene, report: &ImportReport) -> Value {
 }
 
 fn text(scene: &Scene, report: &ImportReport) -> String {
-    let (low, high) = session::bounds(scene).unwrap_or_default();
+    let (low, high) = scene.bounds().unwrap_or_default();
     let size = high - low;
     let list = |names: &[String]| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
     let cameras: Vec<String> = scene

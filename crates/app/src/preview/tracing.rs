@@ -106,7 +106,7 @@ impl Tracing {
             scene.textures.len(),
             if lights == 0 { String::new() } else { format!(", {lights} lights") },
         );
-        let (low, high) = session::bounds(&scene).unwrap_or((Vec3::ZERO, Vec3::ONE));
+        let (low, high) = scene.bounds().unwrap_or((Vec3::ZERO, Vec3::ONE));
         let name = scene.name.clone();
         self.set_scene(scene)?;
         Ok(OpenScene { name, contents, viewpoints, start, notes, diagonal: (high - low).length() })

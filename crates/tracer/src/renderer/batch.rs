@@ -33,6 +33,17 @@ impl Renderer {
     }
 
     pub(super) fn write_params(&self, samples: u32) -> Result<(), RenderError> {
+        let params = self.batch_params(samples)?;
+        for (slab, buffer) in self.film.slabs.iter().zip(&self.params) {
+            let params =
+                BatchParams { first_slab_pixel: slab.first_pixel, slab_pixel_count: slab.pixel_count, ..params };
+            self.gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&params));
+        }
+        Ok(())
+    }
+
+    /// Of the next batch, but for the slab.
+    pub(super) fn batch_params(&self, samples: u32) -> Result<BatchParams, RenderError> {
         let scene = self.scene.as_ref().ok_or(RenderError::NoScene)?;
         let (layers, layer_count, _) = self.distribution.encode();
         let first = self.first_sample + self.samples;
@@ -40,33 +51,29 @@ impl Renderer {
         let columns = order_columns(samples.max(1).ilog2());
         let mut order = [[0; 4]; 5];
         bytemuck::cast_slice_mut::<_, u32>(&mut order).copy_from_slice(&columns);
-        for (slab, buffer) in self.film.slabs.iter().zip(&self.params) {
-            let params = BatchParams {
-                first_index_low: first as u32,
-                first_index_high: (first >> 32) as u32,
-                sample_count: samples,
-                seed: self.options.seed,
-                film_size: [self.options.film.width, self.options.film.height],
-                max_bounces: self.options.max_bounces.min(65_000),
-                light_count: scene.light_count,
-                camera_position: self.pose.position.to_array(),
-                environment_probability: scene.environment_probability,
-                world_from_film: layout::columns(Mat3::from_quat(self.pose.world_from_film)),
-                environment_radiance: scene.environment_radiance.to_array(),
-                environment_rotation_turns: scene.environment_rotation_turns,
-                film_half_extent: self.options.film.half_extent(),
-                first_slab_pixel: slab.first_pixel,
-                slab_pixel_count: slab.pixel_count,
-                radiance_scale,
-                luminance_scale,
-                layer_count,
-                use_sobol: u32::from(self.options.sequence == SequenceKind::Sobol),
-                order,
-                layers,
-            };
-            self.gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&params));
-        }
-        Ok(())
+        Ok(BatchParams {
+            first_index_low: first as u32,
+            first_index_high: (first >> 32) as u32,
+            sample_count: samples,
+            seed: self.options.seed,
+            film_size: [self.options.film.width, self.options.film.height],
+            max_bounces: self.options.max_bounces.min(65_000),
+            light_count: scene.light_count,
+            camera_position: self.pose.position.to_array(),
+            environment_probability: scene.environment_probability,
+            world_from_film: layout::columns(Mat3::from_quat(self.pose.world_from_film)),
+            environment_radiance: scene.environment_radiance.to_array(),
+            environment_rotation_turns: scene.environment_rotation_turns,
+            film_half_extent: self.options.film.half_extent(),
+            first_slab_pixel: 0,
+            slab_pixel_count: 0,
+            radiance_scale,
+            luminance_scale,
+            layer_count,
+            use_sobol: u32::from(self.options.sequence == SequenceKind::Sobol),
+            order,
+            layers,
+        })
     }
 
     pub(super) fn upload_pixel_list(&mut self) {
@@ -143,8 +150,7 @@ impl Renderer {
 impl BoundKernels {
     /// One batch: trace, then add to every slab.
     pub(super) fn record(&self, encoder: &mut wgpu::CommandEncoder, samples: u32) {
-        let groups = samples.div_ceil(WORKGROUP_SIZE).max(1);
-        let workgroups = [groups.min(1 << 15), groups.div_ceil(1 << 15)];
+        let workgroups = workgroups(samples);
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
             label: Some(self.trace.label()),
             timestamp_writes: None,
@@ -154,6 +160,20 @@ impl BoundKernels {
             self.accumulate.dispatch(&mut pass, &[group], workgroups);
         }
     }
+
+    /// Traces without adding to the film: the records are for the host.
+    pub(super) fn record_paths(&self, encoder: &mut wgpu::CommandEncoder, samples: u32) {
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some(self.trace.label()),
+            timestamp_writes: None,
+        });
+        self.trace.dispatch(&mut pass, &[&self.trace_groups[0], &self.trace_groups[1]], workgroups(samples));
+    }
+}
+
+fn workgroups(samples: u32) -> [u32; 2] {
+    let groups = samples.div_ceil(WORKGROUP_SIZE).max(1);
+    [groups.min(1 << 15), groups.div_ceil(1 << 15)]
 }
 
 /// Groups 0 and 1 of a path kernel; `batch` is parameters, records, pixel list, direction numbers.

@@ -66,7 +66,7 @@ impl LightTable {
         if scene.materials.iter().any(|m| m.emissive_texture.is_some()) {
             enter_triangles(geometry, &mut lights);
         }
-        let reach = scene_radius(scene);
+        let reach = scene.bounds().map_or(1.0, |(low, high)| f64::from((high - low).length()) * 0.5);
         let (discs, others): (Vec<_>, Vec<_>) =
             scene.lights.iter().filter(|light| light.intensity.max_element() > 0.0).partition(|light| light.is_disc());
         // Discs last: that is where rays that leave the scene look for them.
@@ -179,17 +179,6 @@ fn punctual_power(light: &PunctualLight, reach: f64) -> f64 {
         PunctualKind::Spot { outer_angle, .. } => 2.0 * PI * (1.0 - f64::from(outer_angle).cos()) * intensity,
         PunctualKind::Directional { .. } => PI * reach * reach * intensity,
     }
-}
-
-fn scene_radius(scene: &Scene) -> f64 {
-    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for instance in scene.instances.iter().filter(|i| i.visible) {
-        for &p in &scene.meshes[instance.mesh as usize].positions {
-            let p = instance.world_from_mesh.transform_point3(p);
-            (low, high) = (low.min(p), high.max(p));
-        }
-    }
-    if low.x <= high.x { f64::from((high - low).length()) * 0.5 } else { 1.0 }
 }
 
 fn mean_color(texture: &Texture) -> Vec3 {
