@@ -8,10 +8,15 @@ use std::{fmt::Write, path::Path};
 use fovea_tests::{
     device,
     lobes::{Bench, Outgoing},
-    scenes::lambert,
+    scenes::{Builder, lambert},
 };
-use glam::Vec3;
-use tracer::scene::Material;
+use glam::{Affine3A, Quat, Vec3};
+use tracer::{
+    distribution::Distribution,
+    film::FilmOptions,
+    renderer::{FilmPose, Renderer, RendererOptions},
+    scene::Material,
+};
 
 /// Samples of a case and channel.
 const SAMPLES: u32 = 1 << 17;
@@ -201,6 +206,31 @@ fn no_lobe_gains_and_compensated_ones_do_not_lose() {
             "---|".repeat(COSINES.len())
         );
         std::fs::write(Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/reports/materials.md"), report).unwrap();
+    }
+}
+
+/// Coarse balls of smooth normals: where the mirror direction of the shading normal would go below the surface, it is bent,
+/// and nothing turns black. Rough metal loses only what goes below.
+#[test]
+fn coarse_metal_balls_have_no_black_rim() {
+    let gpu = device::gpu();
+    for (roughness, least) in [(0.0, 1.0 - ROUNDING), (0.3, 0.85)] {
+        let mut builder = Builder::new(Vec3::ONE);
+        let material = builder.material(metal(roughness));
+        let ball = builder.sphere(6);
+        builder.place(ball, material, Affine3A::IDENTITY);
+        let film = FilmOptions::perspective(48, 48, 0.7);
+        let options = RendererOptions { film, max_bounces: 4, ..Default::default() };
+        let mut renderer =
+            Renderer::new(&gpu, &options, Distribution::omnidirectional(device::inverse())).expect("a small film");
+        renderer.set_scene(&builder.build()).unwrap();
+        renderer.set_pose(FilmPose { position: Vec3::new(0.0, 0.0, 3.0), world_from_film: Quat::IDENTITY });
+        let film = device::trace(&mut renderer, 1 << 18).unwrap();
+        let darkest = film.pixels().map(|pixel| pixel.mean[0]).fold(f64::INFINITY, f64::min);
+        let brightest = film.pixels().map(|pixel| pixel.mean[0]).fold(0.0, f64::max);
+        eprintln!("metal ball of roughness {roughness}: {darkest:.4} to {brightest:.4}");
+        assert!(darkest >= least, "roughness {roughness}: a pixel of {darkest}");
+        assert!(roughness > 0.0 || brightest <= 1.0 + ROUNDING, "a pixel of {brightest}");
     }
 }
 
