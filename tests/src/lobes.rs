@@ -44,6 +44,8 @@ pub struct Bench {
     pub outgoing: Vec<Outgoing>,
     /// Geometric normal; the shading normal is +Z.
     pub geometric: Vec3,
+    /// Of the random numbers.
+    pub seed: u32,
     /// A texture for the materials, made by the scene's builder.
     pub with_textures: fn(&mut Builder, &mut [Material]),
 }
@@ -52,7 +54,7 @@ impl Bench {
     /// A bench without textures whose normals agree.
     pub fn new(materials: Vec<(String, Material)>, outgoing: &[Outgoing]) -> Self {
         let (names, materials) = materials.into_iter().unzip();
-        Self { names, materials, outgoing: outgoing.to_vec(), geometric: Vec3::Z, with_textures: |_, _| () }
+        Self { names, materials, outgoing: outgoing.to_vec(), geometric: Vec3::Z, seed: 11, with_textures: |_, _| () }
     }
 
     /// Number of cases.
@@ -95,7 +97,7 @@ impl Bench {
         body: &str,
     ) -> Vec<FilmPixel> {
         let film = FilmOptions::equirect(columns, self.cases());
-        let options = RendererOptions { film, max_bounces: 0, seed: 11, sequence: SequenceKind::Independent };
+        let options = RendererOptions { film, max_bounces: 0, seed: self.seed, sequence: SequenceKind::Independent };
         let mut renderer =
             Renderer::new(gpu, &options, Distribution::omnidirectional(device::inverse())).expect("a small film");
         let body = format!(

@@ -8,10 +8,15 @@ use std::{fmt::Write, path::Path};
 use fovea_tests::{
     device,
     lobes::{Bench, Outgoing},
-    scenes::lambert,
+    scenes::{Builder, lambert},
 };
-use glam::Vec3;
-use tracer::scene::Material;
+use glam::{Affine3A, Quat, Vec3};
+use tracer::{
+    distribution::Distribution,
+    film::{FilmOptions, FilmPixel},
+    renderer::{FilmPose, Renderer, RendererOptions},
+    scene::Material,
+};
 
 /// Samples of a case and channel.
 const SAMPLES: u32 = 1 << 17;
@@ -38,6 +43,14 @@ struct Lobe {
     is_chromatic: bool,
     is_inside: bool,
     material: fn(f32) -> Material,
+}
+
+impl Lobe {
+    fn is_fault(&self, pixel: &FilmPixel) -> bool {
+        let (mean, error) = (pixel.mean[0], pixel.variance_of_mean.sqrt());
+        let is_dark = self.known == Known::One && mean < 0.99 - 3.0 * error;
+        mean > 1.0 + 3.0 * error + ROUNDING || is_dark || error > LARGEST_ERROR
+    }
 }
 
 fn white(roughness: f32) -> Material {
@@ -183,11 +196,19 @@ fn no_lobe_gains_and_compensated_ones_do_not_lose() {
             if column + 1 == COSINES.len() {
                 table.push_str("|\n");
             }
-            for pixel in channels {
-                let (mean, error) = (pixel.mean[0], pixel.variance_of_mean.sqrt());
-                let is_dark = lobe.known == Known::One && mean < 0.99 - 3.0 * error;
-                if mean > 1.0 + 3.0 * error + ROUNDING || is_dark || error > LARGEST_ERROR {
-                    faults.push(format!("{}: {mean:.5} +- {error:.5}", bench.label(case as u32)));
+            if channels.iter().any(|pixel| lobe.is_fault(pixel)) {
+                // Of hundreds of right values some are 3 standard errors off: others, and more, samples decide.
+                let index = case / COSINES.len();
+                let material = (bench.names[index].clone(), bench.materials[index].clone());
+                let mut again = Bench::new(vec![material], &outgoing[column..=column]);
+                again.seed = 12;
+                for pixel in again.furnace(&gpu, 8 * SAMPLES, channels.len() as u32) {
+                    let words =
+                        format!("{}: {:.5} +- {:.5}", again.label(0), pixel.mean[0], pixel.variance_of_mean.sqrt());
+                    eprintln!("again {words}");
+                    if lobe.is_fault(&pixel) {
+                        faults.push(words);
+                    }
                 }
             }
         }
@@ -201,6 +222,31 @@ fn no_lobe_gains_and_compensated_ones_do_not_lose() {
             "---|".repeat(COSINES.len())
         );
         std::fs::write(Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/reports/materials.md"), report).unwrap();
+    }
+}
+
+/// Coarse balls of smooth normals: where the mirror direction of the shading normal would go below the surface, it is bent,
+/// and nothing turns black. Rough metal loses what goes below: at most 0.3 at the rim of a ball whose facets turn by 30 degrees.
+#[test]
+fn coarse_metal_balls_have_no_black_rim() {
+    let gpu = device::gpu();
+    for (roughness, least) in [(0.0, 1.0 - ROUNDING), (0.3, 0.65)] {
+        let mut builder = Builder::new(Vec3::ONE);
+        let material = builder.material(metal(roughness));
+        let ball = builder.sphere(6);
+        builder.place(ball, material, Affine3A::IDENTITY);
+        let film = FilmOptions::perspective(48, 48, 0.7);
+        let options = RendererOptions { film, max_bounces: 4, ..Default::default() };
+        let mut renderer =
+            Renderer::new(&gpu, &options, Distribution::omnidirectional(device::inverse())).expect("a small film");
+        renderer.set_scene(&builder.build()).unwrap();
+        renderer.set_pose(FilmPose { position: Vec3::new(0.0, 0.0, 3.0), world_from_film: Quat::IDENTITY });
+        let film = device::trace(&mut renderer, 1 << 18).unwrap();
+        let darkest = film.pixels().map(|pixel| pixel.mean[0]).fold(f64::INFINITY, f64::min);
+        let brightest = film.pixels().map(|pixel| pixel.mean[0]).fold(0.0, f64::max);
+        eprintln!("metal ball of roughness {roughness}: {darkest:.4} to {brightest:.4}");
+        assert!(darkest >= least, "roughness {roughness}: a pixel of {darkest}");
+        assert!(roughness > 0.0 || brightest <= 1.0 + ROUNDING, "a pixel of {brightest}");
     }
 }
 

@@ -46,13 +46,15 @@ pub(super) fn upload(gpu: &Gpu, features: SceneFeatures, bytes: &mut u64) -> wgp
     let layered = [Feature::Specular, Feature::Clearcoat, Feature::Sheen];
     let mut texels = Vec::new();
     if layered.iter().any(|&feature| features.contains(feature)) {
-        texels.extend_from_slice(reflection_table());
-    }
-    if features.contains(Feature::Sheen) {
-        texels.iter_mut().zip(sheen_table()).for_each(|(texel, &albedo)| texel[2] = albedo);
+        texels.extend(in_pairs(reflection_table(), ALBEDO_COLUMNS));
+        let sheen = if features.contains(Feature::Sheen) { sheen_table() } else { &[] };
+        texels.extend(in_pairs(sheen, ALBEDO_COLUMNS));
+        texels.resize((2 * ALBEDO_COLUMNS * ALBEDO_ROWS) as usize, [0.0; 4]);
     }
     if features.contains(Feature::Solid) {
-        texels.extend_from_slice(glass_table());
+        let rows = in_pairs(glass_table(), GLASS_SIZE);
+        let rest = [[0.0; 4]; (ALBEDO_COLUMNS - GLASS_SIZE) as usize];
+        rows.chunks(GLASS_SIZE as usize).for_each(|row| texels.extend(row.iter().chain(&rest)));
     }
     let mut size = [ALBEDO_COLUMNS, texels.len() as u32 / ALBEDO_COLUMNS];
     if texels.is_empty() {
@@ -78,54 +80,57 @@ pub(super) fn upload(gpu: &Gpu, features: SceneFeatures, bytes: &mut u64) -> wgp
         .create_view(&Default::default())
 }
 
-/// Rows of alpha, columns of cosine: GGX with f0 = 1 and f90 = 0, then with f0 = 0 and f90 = 1.
-fn reflection_table() -> &'static [[f32; 4]] {
-    static TABLE: OnceLock<Vec<[f32; 4]>> = OnceLock::new();
-    TABLE.get_or_init(|| {
-        let count = ALBEDO_COLUMNS * ALBEDO_ROWS;
-        let entry = |i: u32| {
-            let cosine = node(i % ALBEDO_COLUMNS, ALBEDO_COLUMNS).max(LEAST_COSINE);
-            let alpha = node(i / ALBEDO_COLUMNS, ALBEDO_ROWS);
-            let [near, grazing] = ggx_albedos(cosine, alpha, FINE);
-            [raised(near, SAFETY), raised(grazing, SAFETY), 0.0, 0.0]
-        };
-        (0..count).into_par_iter().map(entry).collect()
-    })
+/// Each texel holds an entry and its neighbour along the row: interpolation needs half as many loads.
+fn in_pairs(entries: &[[f32; 2]], columns: u32) -> Vec<[f32; 4]> {
+    let pair = |row: &[[f32; 2]], i: usize| {
+        let next = row[(i + 1).min(row.len() - 1)];
+        [row[i][0], row[i][1], next[0], next[1]]
+    };
+    entries.chunks(columns as usize).flat_map(|row| (0..row.len()).map(move |i| pair(row, i))).collect()
 }
 
-/// White sheen, in the order of [`reflection_table`].
-fn sheen_table() -> &'static [f32] {
-    static TABLE: OnceLock<Vec<f32>> = OnceLock::new();
+/// Rows of alpha, columns of cosine: GGX with f0 = 1 and f90 = 0, then with f0 = 0 and f90 = 1.
+fn reflection_table() -> &'static [[f32; 2]] {
+    static TABLE: OnceLock<Vec<[f32; 2]>> = OnceLock::new();
     TABLE.get_or_init(|| {
         let entry = |i: u32| {
             let cosine = node(i % ALBEDO_COLUMNS, ALBEDO_COLUMNS).max(LEAST_COSINE);
-            let alpha = node(i / ALBEDO_COLUMNS, ALBEDO_ROWS).max(LEAST_SHEEN_ALPHA);
-            raised(charlie_albedo(cosine, alpha, FINE), SHEEN_SAFETY)
+            ggx_albedos(cosine, node(i / ALBEDO_COLUMNS, ALBEDO_ROWS), FINE).map(|albedo| raised(albedo, SAFETY))
         };
         (0..ALBEDO_COLUMNS * ALBEDO_ROWS).into_par_iter().map(entry).collect()
     })
 }
 
-/// One square of rows of alpha and columns of cosine per index, `GLASS_SIZE` rows each; only the first columns are used.
-/// Entries are over the albedo of a perfect reflector of the same roughness, which leaves little to interpolate.
-fn glass_table() -> &'static [[f32; 4]] {
-    static TABLE: OnceLock<Vec<[f32; 4]>> = OnceLock::new();
+/// White sheen, in the order of [`reflection_table`]; the second number is unused.
+fn sheen_table() -> &'static [[f32; 2]] {
+    static TABLE: OnceLock<Vec<[f32; 2]>> = OnceLock::new();
     TABLE.get_or_init(|| {
         let entry = |i: u32| {
-            let (column, row) = (i % ALBEDO_COLUMNS, i / ALBEDO_COLUMNS);
-            if column >= GLASS_SIZE {
-                return [0.0; 4];
-            }
+            let cosine = node(i % ALBEDO_COLUMNS, ALBEDO_COLUMNS).max(LEAST_COSINE);
+            let alpha = node(i / ALBEDO_COLUMNS, ALBEDO_ROWS).max(LEAST_SHEEN_ALPHA);
+            [raised(charlie_albedo(cosine, alpha, FINE), SHEEN_SAFETY), 0.0]
+        };
+        (0..ALBEDO_COLUMNS * ALBEDO_ROWS).into_par_iter().map(entry).collect()
+    })
+}
+
+/// Per index a square of rows of alpha and columns of cosine: reflected, then transmitted, over the albedo of a perfect
+/// reflector of the same roughness, which leaves little to interpolate.
+fn glass_table() -> &'static [[f32; 2]] {
+    static TABLE: OnceLock<Vec<[f32; 2]>> = OnceLock::new();
+    TABLE.get_or_init(|| {
+        let entry = |i: u32| {
+            let (column, row) = (i % GLASS_SIZE, i / GLASS_SIZE);
             let cosine = node(column, GLASS_SIZE).max(LEAST_COSINE);
             let alpha = node(row % GLASS_SIZE, GLASS_SIZE);
             // The ends, where one index is infinitely above the other, only have to be finite.
             let root = 2.0 * f64::from(row / GLASS_SIZE) / f64::from(GLASS_LAYERS - 1) - 1.0;
             let z = (root * root.abs()).clamp(-0.999, 0.999);
-            let [reflected, transmitted] = glass_albedos(cosine, alpha, (1.0 + z) / (1.0 - z), COARSE);
             let white = ggx_albedos(cosine, alpha, COARSE).iter().sum::<f64>();
-            [raised(reflected / white, GLASS_SAFETY), raised(transmitted / white, GLASS_SAFETY), 0.0, 0.0]
+            let glass = glass_albedos(cosine, alpha, (1.0 + z) / (1.0 - z), COARSE);
+            glass.map(|albedo| raised(albedo / white, GLASS_SAFETY))
         };
-        (0..ALBEDO_COLUMNS * GLASS_SIZE * GLASS_LAYERS).into_par_iter().map(entry).collect()
+        (0..GLASS_SIZE * GLASS_SIZE * GLASS_LAYERS).into_par_iter().map(entry).collect()
     })
 }
 
@@ -273,7 +278,7 @@ mod tests {
         let ((x, fx), (y, fy)) = (place(cosine, ALBEDO_COLUMNS), place(alpha, ALBEDO_ROWS));
         let at = |x: u32, y: u32, k: usize| {
             let i = (y * ALBEDO_COLUMNS + x) as usize;
-            f64::from(if k == 2 { sheen_table()[i] } else { reflection_table()[i][k] })
+            f64::from(if k == 2 { sheen_table()[i][0] } else { reflection_table()[i][k] })
         };
         std::array::from_fn(|k| {
             let low = at(x, y, k) * (1.0 - fx) + at(x + 1, y, k) * fx;
