@@ -2,7 +2,7 @@
 //! errors of at most 0.5 %. Right values fail one of these checks with probability 0.3 %; the seeds make that a fact, once.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::{f64::consts::PI, sync::Arc};
+use std::f64::consts::PI;
 
 use fovea_tests::{
     device, pencil,
