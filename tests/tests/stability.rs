@@ -6,7 +6,7 @@
 //! since it stands in an environment a thousand times as bright, the smallest leak shows.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::f64::consts::PI;
+use std::{f64::consts::PI, time::Instant};
 
 use fovea_tests::{
     device,
@@ -20,6 +20,7 @@ use tracer::{
     film::FilmOptions,
     gpu::Gpu,
     import::{ImportOptions, load_glb_bytes},
+    kernels::FILM_WORDS,
     renderer::{Renderer, RendererOptions, SequenceKind},
     scene::{Environment, Material, Scene},
 };
@@ -413,7 +414,8 @@ fn four_thousand_bounces_between_mirrors() {
     assert_eq!(found.statistics.segments, 256 * 4097, "no path ended early");
 }
 
-/// A tessellated sphere from its centre: every pixel sees the inside, edges and corners included.
+/// A tessellated sphere from its centre: every pixel sees the inside, edges and corners included. Beside it what the test of
+/// Moeller and Trumbore would let through, and the time that both take.
 #[test]
 fn a_closed_mesh_has_no_gaps() {
     let gpu = device::gpu();
@@ -421,18 +423,36 @@ fn a_closed_mesh_has_no_gaps() {
     let material = builder.material(Material { emission: Vec3::ONE, double_sided: true, ..lambert(Vec3::ZERO) });
     let sphere = builder.sphere(64);
     builder.place(sphere, material, Affine3A::IDENTITY);
+    let scene = builder.build();
     let options = RendererOptions {
         film: FilmOptions::equirect(256, 128),
         max_bounces: 0,
         sequence: SequenceKind::Sobol,
         seed: 5,
     };
-    let mut renderer = Renderer::new(&gpu, &options, Distribution::omnidirectional(device::inverse())).unwrap();
-    renderer.set_scene(&builder.build()).unwrap();
-    let film = device::trace(&mut renderer, 1 << 20).unwrap();
-    let worst = film.pixels().map(|pixel| (pixel.mean[1] - 1.0).abs()).fold(0.0, f64::max);
-    eprintln!("| 2^20 rays from inside a mesh of 16,128 triangles | 1 | no leak | | {worst:.1e} |");
-    assert!(worst < 1e-9, "a ray went through: {worst}");
+    let inside = "let inside = min(u, min(v, w)) >= 0.0 || max(u, max(v, w)) <= 0.0;";
+    let moeller_trumbore = "let p = cross(ray.direction, c - a);
+    let q = cross(b - a, a);
+    let determinant = dot(b - a, p);
+    let s = -dot(a, p) / determinant;
+    let r = dot(ray.direction, q) / determinant;
+    let inside = determinant != 0.0 && s >= 0.0 && r >= 0.0 && s + r <= 1.0;";
+    let trace = |planted: &str| {
+        let mut renderer = Renderer::new(&gpu, &options, Distribution::omnidirectional(device::inverse())).unwrap();
+        let sources = exchanged(renderer.shaders(), "scene::traverse", &[(inside, planted)]);
+        renderer.set_shaders(sources).unwrap();
+        renderer.set_scene(&scene).unwrap();
+        let started = Instant::now();
+        let film = device::trace(&mut renderer, 1 << 20).unwrap();
+        let seconds = started.elapsed().as_secs_f64();
+        let leaks: f64 = film.pixels().map(|pixel| (pixel.mean[1] - 1.0) / 999.0 * f64::from(pixel.samples)).sum();
+        (leaks.round(), seconds)
+    };
+    for (what, planted) in [("Pluecker", inside), ("Moeller and Trumbore", moeller_trumbore)] {
+        let (leaks, seconds) = trace(planted);
+        eprintln!("| rays of 2^20 that leave a closed mesh, {what}, {seconds:.2} s | 0 | {leaks} | | |");
+        assert!(planted != inside || leaks == 0.0);
+    }
 }
 
 /// Sums of up to 2^26 samples in one pixel are exact to the rounding of each sample.
@@ -456,9 +476,55 @@ fn many_samples_in_one_pixel() {
     eprintln!("| 2^{log2} samples in one pixel | {expected:.6e} | {:.6e} | | {error:+.1e} |", pixel.mean[1]);
     assert!(error.abs() < 1e-7, "{error:e}");
     assert!((pixel.variance_of_mean.sqrt() / deviation - 1.0).abs() < 1e-4, "{pixel:?}");
-    let plain = (0..1u32 << log2).fold(0.0f32, |sum, i| sum + if i % 64 == 0 { 1000.0 } else { 1.0 } / 3.0);
-    let plain_error = f64::from(plain) / f64::from(1u32 << log2) / expected - 1.0;
-    eprintln!("| the same in a plain f32 sum, for comparison | {expected:.6e} | | | {plain_error:+.1e} |");
+    compare_sums(log2, expected);
+}
+
+/// What other ways to sum would have given, and what one addition costs on one core.
+fn compare_sums(log2: u32, expected: f64) {
+    let value = |i: u32| if i.is_multiple_of(64) { 1000.0 } else { 1.0 } / 3.0f32;
+    let count = 1u32 << log2;
+    let report = |what: &str, sum: f64, started: Instant| {
+        let nanoseconds = started.elapsed().as_secs_f64() * 1e9 / f64::from(count);
+        let error = sum / f64::from(count) / expected - 1.0;
+        eprintln!("| the same by {what}, {nanoseconds:.2} ns each on a core | {expected:.6e} | | | {error:+.1e} |");
+        error.abs()
+    };
+    let started = Instant::now();
+    let plain = (0..count).fold(0.0f32, |sum, i| sum + value(i));
+    let plain = report("a plain f32 sum", plain.into(), started);
+    let started = Instant::now();
+    let (kahan, _) = (0..count).fold((0.0f32, 0.0f32), |(sum, lost), i| {
+        let term = value(i) - lost;
+        let next = sum + term;
+        (next, (next - sum) - term)
+    });
+    let kahan = report("a compensated f32 sum", kahan.into(), started);
+    let started = Instant::now();
+    let integer = (0..count).fold(0u64, |sum, i| sum + (value(i) * 1_073_741_824.0) as u64);
+    let integer = report("a 64-bit integer sum", integer as f64 / 1_073_741_824.0, started);
+    assert!(kahan < 1e-6 && integer < 1e-6 && plain > integer);
+}
+
+/// A film of 16384x8192 pixels (5.4 GB; 4096x2048 unless long runs are asked for) takes samples everywhere and loses none.
+#[test]
+fn a_film_of_134_million_pixels() {
+    let gpu = device::gpu();
+    let is_long = std::env::var_os("FOVEA_LONG_RUNS").is_some();
+    let film = if is_long { FilmOptions::equirect(16_384, 8192) } else { FilmOptions::equirect(4096, 2048) };
+    let options = RendererOptions { film, max_bounces: 0, ..Default::default() };
+    let mut renderer = Renderer::new(&gpu, &options, Distribution::omnidirectional(device::inverse())).unwrap();
+    renderer.set_scene(&scenes::empty(Vec3::ONE)).unwrap();
+    let samples = 1u64 << 20;
+    let snapshot = device::trace(&mut renderer, samples).unwrap();
+    let (mut counted, mut top, mut bottom) = (0, 0, 0);
+    let half = film.pixels() / 2;
+    for (index, words) in (0u64..).zip(snapshot.words.chunks_exact(FILM_WORDS as usize)) {
+        counted += u64::from(words[6]);
+        *(if index < half { &mut top } else { &mut bottom }) += u64::from(words[6]);
+    }
+    eprintln!("| film of {}x{}: samples counted | {samples} | {counted} | | |", film.width, film.height);
+    assert_eq!(counted, samples);
+    assert!((top as f64 / bottom as f64 - 1.0).abs() < 0.01, "{top} {bottom}");
 }
 
 /// What the room shows when rays start closer to their surface than its rounding: the cases above do notice.
