@@ -58,7 +58,9 @@ pub fn lsl_info(data: &[u8]) {
         assert!(!id.contains('\n'));
         described(&info);
     }
-    if let Ok(info) = std::str::from_utf8(data).map_err(|_| ()).and_then(|xml| StreamInfo::from_xml(xml).map_err(|_| ())) {
+    if let Ok(info) =
+        std::str::from_utf8(data).map_err(|_| ()).and_then(|xml| StreamInfo::from_xml(xml).map_err(|_| ()))
+    {
         described(&info);
     }
     if let Ok(reply) = ClockReply::parse(data) {

@@ -19,7 +19,7 @@ pub struct FilterSettings {
     /// Speed that is a saccade, in multiples of the measured noise of the speed. Lower lands sooner after small saccades
     /// and takes more noise for one.
     pub saccade_noises: f64,
-    /// Distance from the filtered gaze that is a small saccade, in multiples of the noise of a short mean.
+    /// Distance from the filtered gaze that is a small saccade, in multiples of the noise of that distance.
     pub step_noises: f64,
 }
 
@@ -31,15 +31,23 @@ impl Default for FilterSettings {
             derivative_cutoff_hz: 1.0,
             saccade_deg_per_s: 100.0,
             saccade_noises: 6.0,
-            step_noises: 6.0,
+            step_noises: 5.0,
         }
     }
 }
 
 /// Over how long speed is measured, seconds.
 const SPEED_SECS: f64 = 0.02;
-/// Over how long the mean is taken that tells a small saccade from noise, seconds; at least three samples.
-const STEP_SECS: f64 = 0.03;
+/// Samples of the longest mean that tells a small saccade from noise.
+const STEP_SAMPLES: u32 = 3;
+/// A step smaller than this is left to smoothing, degrees.
+const SMALLEST_STEP_DEG: f64 = 0.3;
+/// For so long after a jump a slower movement still belongs to it, seconds.
+const STILL_JUMPING_SECS: f64 = 0.04;
+/// How much slower, as a share of a saccade's speed.
+const STILL_JUMPING: f64 = 0.5;
+/// Times are compared with so much slack, seconds, so that rounded time stamps of one trace give one answer.
+const SLACK_SECS: f64 = 1e-4;
 /// A gap longer than this is a blink, a shorter one a dropout, seconds.
 const BLINK_SECS: f64 = 0.03;
 /// What lies so shortly before a blink is the lid's work, seconds.
@@ -91,6 +99,8 @@ pub struct GazeFilter {
     current: Option<Current>,
     last_valid_secs: Option<f64>,
     blink: Blink,
+    /// When the eye last jumped for certain.
+    jumped_secs: Option<f64>,
     /// Smoothed time between samples, seconds.
     interval_secs: Option<f64>,
 }
@@ -125,6 +135,7 @@ impl GazeFilter {
             current: None,
             last_valid_secs: None,
             blink: Blink::No,
+            jumped_secs: None,
             interval_secs: None,
         }
     }
@@ -145,7 +156,7 @@ impl GazeFilter {
     fn invalid(&mut self, time_secs: f64) -> Option<Filtered> {
         let (current, last) = self.current.zip(self.last_valid_secs)?;
         let gap = time_secs - last;
-        if gap >= BLINK_SECS {
+        if gap >= BLINK_SECS - SLACK_SECS {
             self.blink = match self.blink {
                 Blink::No => Blink::Closed(self.before_blink(last).unwrap_or(current.point_deg)),
                 Blink::Closed(point) | Blink::Opened(_, point) => Blink::Closed(point),
@@ -165,7 +176,7 @@ impl GazeFilter {
 
     /// The last output that the closing lid did not touch.
     fn before_blink(&self, last_valid_secs: f64) -> Option<[f64; 2]> {
-        let clean = |(time_secs, _): &&(f64, _)| *time_secs <= last_valid_secs - BEFORE_BLINK_SECS;
+        let clean = |(time_secs, _): &&(f64, _)| *time_secs <= last_valid_secs - BEFORE_BLINK_SECS + SLACK_SECS;
         self.outputs.iter().rev().find(clean).map(|(_, point)| *point)
     }
 
@@ -176,7 +187,7 @@ impl GazeFilter {
             self.blink = Blink::Opened(time_secs, held);
         }
         if let Blink::Opened(at, held) = self.blink {
-            if time_secs - at < AFTER_BLINK_SECS {
+            if time_secs - at < AFTER_BLINK_SECS - SLACK_SECS {
                 return Filtered { point_deg: held, phase: Phase::Blink, restarted: false };
             }
             self.blink = Blink::No;
@@ -197,10 +208,16 @@ impl GazeFilter {
             if self.speeds.len() > SPEEDS {
                 self.speeds.pop_front();
             }
-            if speed > self.settings.saccade_deg_per_s.max(self.settings.saccade_noises * noise.unwrap_or(0.0)) {
+            let saccade = self.settings.saccade_deg_per_s.max(self.settings.saccade_noises * noise.unwrap_or(0.0));
+            let jumping = self.jumped_secs.is_some_and(|at| time_secs - at < STILL_JUMPING_SECS);
+            if speed > if jumping { STILL_JUMPING * saccade } else { saccade } {
+                if speed > saccade {
+                    self.jumped_secs = Some(time_secs);
+                }
                 return self.restart(time_secs, point, 1.0, Phase::Saccade);
             }
-            if let Some((mean, count)) = noise.and_then(|noise| self.step(time_secs, current, noise)) {
+            if let Some((mean, count)) = noise.and_then(|noise| self.step(current, noise)) {
+                self.jumped_secs = Some(time_secs);
                 return self.restart(time_secs, mean, count, Phase::Saccade);
             }
         }
@@ -226,23 +243,30 @@ impl GazeFilter {
         Some(*median / RAYLEIGH_MEDIAN)
     }
 
-    /// The mean of the last few samples and their number, when it lies farther from the filtered gaze than noise puts it.
-    fn step(&self, time_secs: f64, current: Current, speed_noise: f64) -> Option<([f64; 2], f64)> {
-        let last = self.recent.iter().rev().enumerate();
-        let last: Vec<[f64; 2]> = last
-            .take_while(|(index, (time, _))| *index < 3 || time_secs - time <= STEP_SECS)
-            .map(|(_, (_, point))| *point)
-            .collect();
-        let count = last.len() as f64;
-        if last.len() < 3 || current.count < 2.0 * count {
-            return None;
-        }
-        let mean = last.iter().fold([0.0; 2], |sum, point| [sum[0] + point[0] / count, sum[1] + point[1] / count]);
-        // Noise of one sample from the noise of a difference of two, then of the mean.
+    /// The mean of the last one, two or three samples and their number, when it lies farther from the filtered gaze than
+    /// the noise of both puts it. One sample tells a large jump at once, three a small one soon.
+    fn step(&self, current: Current, speed_noise: f64) -> Option<([f64; 2], f64)> {
         let interval = self.interval_secs.unwrap_or(SPEED_SECS).max(1e-4);
+        // Noise of one sample from that of the difference of two that lie about 20 ms apart.
         let span = (SPEED_SECS / interval).round().max(1.0) * interval;
-        let noise = speed_noise * span / std::f64::consts::SQRT_2 / count.sqrt();
-        (distance(mean, current.point_deg) > (self.settings.step_noises * noise).max(0.3)).then_some((mean, count))
+        let noise = speed_noise * span / std::f64::consts::SQRT_2;
+        // A first-order low-pass is as noisy as a mean of so many.
+        let smoothed = (2.0 / smoothing(self.settings.min_cutoff_hz, interval) - 1.0).min(current.count);
+        let mut sum = [0.0; 2];
+        for (count, (_, point)) in (1..=STEP_SAMPLES).zip(self.recent.iter().rev()) {
+            sum = [sum[0] + point[0], sum[1] + point[1]];
+            let count = f64::from(count);
+            let mean = sum.map(|axis| axis / count);
+            let expected = noise * (1.0 / count + 1.0 / smoothed).sqrt();
+            // Later samples are part of the filtered gaze already when smoothing has just begun.
+            let known = current.count >= 2.0 * count;
+            if known
+                && distance(mean, current.point_deg) > (self.settings.step_noises * expected).max(SMALLEST_STEP_DEG)
+            {
+                return Some((mean, count));
+            }
+        }
+        None
     }
 
     fn restart(&mut self, time_secs: f64, point_deg: [f64; 2], count: f64, phase: Phase) -> Filtered {

@@ -49,7 +49,16 @@ impl Socket {
         let mut stream = outlet.connect(host, port)?;
         stream.write_all(&zmtp::greeting())?;
         stream.write_all(&zmtp::ready(kind))?;
-        Ok(Self { stream, peer: Peer::default(), ready: VecDeque::new(), heard: Instant::now() })
+        let mut socket = Self { stream, peer: Peer::default(), ready: VecDeque::new(), heard: Instant::now() };
+        // libzmq hangs up on a peer whose first message comes before the handshake is over.
+        let asked = Instant::now();
+        while !socket.peer.is_ready() {
+            if asked.elapsed() > ANSWER {
+                return Err(Ended::Lost(format!("{host}:{port} accepts, but does not speak ZeroMQ")));
+            }
+            socket.read(outlet)?;
+        }
+        Ok(socket)
     }
 
     /// Reads what has come.
@@ -107,16 +116,12 @@ impl PupilCore {
         let mut publisher = Socket::open(outlet, &self.host, port, "SUB")?;
         // A subscription is a message of a 1 and the topic's beginning.
         publisher.stream.write_all(&zmtp::frame(&[&[1], topic.as_bytes()].concat(), false))?;
-        outlet.update(|status| status.detail = format!("{}:{port}, {topic}", self.host));
+        outlet.update(|status| {
+            status.detail = format!("{}:{port}, {topic}", self.host);
+            status.state = SourceState::Connected;
+        });
         loop {
             publisher.read(outlet)?;
-            if publisher.peer.is_ready() {
-                outlet.update(|status| {
-                    if status.state == SourceState::Searching || matches!(status.state, SourceState::Lost(_)) {
-                        status.state = SourceState::Connected;
-                    }
-                });
-            }
             while let Some(message) = publisher.ready.pop_front() {
                 let Some(payload) = message.get(1) else { continue };
                 match SurfaceMessage::parse(payload) {

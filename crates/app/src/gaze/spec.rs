@@ -182,7 +182,9 @@ impl FromStr for LslSpec {
                 "unit" => mapping.unit = unit(value)?,
                 "origin" => mapping.origin = origin(value)?,
                 _ => {
-                    return Err(format!("`{key}`; known are name, type, host, preset, x, y, valid, conf, unit, origin"));
+                    return Err(format!(
+                        "`{key}`; known are name, type, host, preset, x, y, valid, conf, unit, origin"
+                    ));
                 }
             }
         }
