@@ -240,7 +240,7 @@ impl GazeHub {
         let mut hub = self.lock();
         hub.update(now);
         let target = hub.target(view);
-        hub.timing.batch(now, target.sample);
+        hub.timing.batch(now);
         target
     }
 
@@ -375,6 +375,7 @@ impl Hub {
     fn take(&mut self, sample: &GazeSample) {
         let Some(entry) = self.entries.get(self.active) else { return };
         let times = SampleTimes { captured: sample.captured, arrived: sample.arrived, is_eye: entry.source.is_eye() };
+        self.timing.arrived(times);
         let Some(view) = self.views.at(sample.captured).copied() else { return };
         if !times.is_eye {
             let deg = self.place.deg(sample.point, None);

@@ -5,20 +5,23 @@ use std::time::{Duration, Instant};
 
 use super::SampleTimes;
 
-/// Measurements that a figure is taken over.
-const KEPT: usize = 256;
+/// Over how long figures are taken, and over how many measurements at most.
+const KEPT: Duration = Duration::from_secs(3);
+const MOST: usize = 8192;
+/// Samples that may wait for one batch; more than come in a second at 2,000 Hz.
+const WAITING: usize = 4096;
 /// Above this the age of the sample is too much (R. Albert et al., ACM Transactions on Applied Perception 14(4), 2017: 50
 /// to 70 ms go unnoticed, 80 to 150 ms more do not).
 pub const TOO_OLD: Duration = Duration::from_millis(70);
 
-/// Figures over the last [`KEPT`] samples and pictures.
+/// Figures over the last three seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TimingReport {
-    /// From the arrival of a sample to the batch that used it: median and largest.
+    /// From the arrival of a sample to the first batch that could go by it: median and largest, over all samples.
     pub arrival_to_batch: Option<(Duration, Duration)>,
     /// From the eye to the picture: median.
     pub age: Option<Duration>,
-    /// From one batch to the next: largest. No sample can wait longer than that.
+    /// From the beginning of one batch to that of the next, with the picture between them: largest.
     pub longest_frame: Option<Duration>,
 }
 
@@ -32,55 +35,74 @@ impl TimingReport {
 /// Gathers them.
 #[derive(Clone, Debug, Default)]
 pub struct Timing {
-    waits: VecDeque<Duration>,
-    ages: VecDeque<Duration>,
-    frames: VecDeque<Duration>,
+    waits: Recent,
+    ages: Recent,
+    frames: Recent,
     last_batch: Option<Instant>,
-    last_sample: Option<Instant>,
+    /// Arrivals since the last batch.
+    waiting: VecDeque<Instant>,
 }
 
 impl Timing {
-    /// A batch begins, for a sample. Only the first batch of a sample says how long that waited.
-    pub fn batch(&mut self, now: Instant, sample: Option<SampleTimes>) {
-        if let Some(last) = self.last_batch.replace(now) {
-            keep(&mut self.frames, now.saturating_duration_since(last));
+    /// A sample has come.
+    pub fn arrived(&mut self, sample: SampleTimes) {
+        // Before the first batch there is nothing to wait for.
+        if sample.is_eye && self.last_batch.is_some() && self.waiting.len() < WAITING {
+            self.waiting.push_back(sample.arrived);
         }
-        let Some(sample) = sample.filter(|sample| sample.is_eye) else { return };
-        if self.last_sample.replace(sample.arrived) != Some(sample.arrived) {
-            keep(&mut self.waits, now.saturating_duration_since(sample.arrived));
+    }
+
+    /// A batch begins, and goes by the newest of the samples that have come.
+    pub fn batch(&mut self, now: Instant) {
+        if let Some(last) = self.last_batch.replace(now) {
+            self.frames.keep(now, now.saturating_duration_since(last));
+        }
+        for arrived in self.waiting.drain(..) {
+            self.waits.keep(now, now.saturating_duration_since(arrived));
         }
     }
 
     /// A picture is done, whose newest batch was traced for a sample.
     pub fn shown(&mut self, now: Instant, sample: Option<SampleTimes>) {
         match sample.filter(|sample| sample.is_eye) {
-            Some(sample) => keep(&mut self.ages, now.saturating_duration_since(sample.captured)),
+            Some(sample) => self.ages.keep(now, now.saturating_duration_since(sample.captured)),
             // A pointer has no age worth telling.
-            None => self.ages.clear(),
+            None => self.ages = Recent::default(),
         }
     }
 
     /// The figures.
     pub fn report(&self) -> TimingReport {
         TimingReport {
-            arrival_to_batch: median(&self.waits).zip(self.waits.iter().max().copied()),
-            age: median(&self.ages),
-            longest_frame: self.frames.iter().max().copied(),
+            arrival_to_batch: self.waits.median().zip(self.waits.largest()),
+            age: self.ages.median(),
+            longest_frame: self.frames.largest(),
         }
     }
 }
 
-fn keep(values: &mut VecDeque<Duration>, value: Duration) {
-    values.push_back(value);
-    if values.len() > KEPT {
-        values.pop_front();
-    }
-}
+/// Measurements with the times at which they were made.
+#[derive(Clone, Debug, Default)]
+struct Recent(VecDeque<(Instant, Duration)>);
 
-fn median(values: &VecDeque<Duration>) -> Option<Duration> {
-    let mut sorted: Vec<Duration> = values.iter().copied().collect();
-    sorted.sort_unstable();
-    sorted.get(sorted.len() / 2).copied()
+impl Recent {
+    fn keep(&mut self, now: Instant, value: Duration) {
+        self.0.push_back((now, value));
+        let old = |(at, _): &(Instant, Duration)| now.saturating_duration_since(*at) > KEPT;
+        while self.0.len() > MOST || self.0.front().is_some_and(old) {
+            self.0.pop_front();
+        }
+    }
+
+    fn median(&self) -> Option<Duration> {
+        let mut sorted: Vec<Duration> = self.0.iter().map(|(_, value)| *value).collect();
+        sorted.sort_unstable();
+        sorted.get(sorted.len() / 2).copied()
+    }
+
+    fn largest(&self) -> Option<Duration> {
+        self.0.iter().map(|(_, value)| *value).max()
+    }
 }
 
 #[cfg(test)]
@@ -93,22 +115,26 @@ mod tests {
         let at = |ms: u64| start + Duration::from_millis(ms);
         let eye = |captured, arrived| Some(SampleTimes { captured: at(captured), arrived: at(arrived), is_eye: true });
         let mut timing = Timing::default();
-        timing.batch(at(30), eye(10, 20));
-        timing.batch(at(45), eye(10, 20));
+        timing.batch(at(12));
+        [20, 24, 29].into_iter().filter_map(|ms| eye(ms - 10, ms)).for_each(|sample| timing.arrived(sample));
+        timing.batch(at(30));
+        timing.batch(at(45));
         timing.shown(at(60), eye(10, 20));
-        timing.batch(at(62), eye(50, 58));
+        timing.batch(at(62));
         let report = timing.report();
-        assert_eq!(report.arrival_to_batch, Some((Duration::from_millis(10), Duration::from_millis(10))));
+        assert_eq!(report.arrival_to_batch, Some((Duration::from_millis(6), Duration::from_millis(10))));
         assert_eq!(report.age, Some(Duration::from_millis(50)));
-        assert_eq!(report.longest_frame, Some(Duration::from_millis(17)));
+        assert_eq!(report.longest_frame, Some(Duration::from_millis(18)));
         assert!(!report.is_too_old());
         (0..300).for_each(|_| timing.shown(at(200), eye(100, 120)));
-        assert!(timing.report().is_too_old() && timing.ages.len() == KEPT);
+        assert!(timing.report().is_too_old());
+        timing.shown(at(4000), eye(3960, 3970));
+        assert_eq!(timing.report().age, Some(Duration::from_millis(40)), "older ones are forgotten");
         let pointer = SampleTimes {
             is_eye: false,
             ..eye(0, 0).unwrap_or(SampleTimes { captured: start, arrived: start, is_eye: false })
         };
-        timing.shown(at(300), Some(pointer));
+        timing.shown(at(4100), Some(pointer));
         assert_eq!(timing.report().age, None);
     }
 }
