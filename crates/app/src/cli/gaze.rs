@@ -7,6 +7,9 @@ use clap::Args;
 use super::values;
 use crate::gaze::spec::SourceSpec;
 
+const SOURCES: &str = "Watch this source: opengaze[:HOST[:PORT]], lsl[:name=N,type=T,...], pupil[:HOST[:PORT]][/SURFACE] or \
+    trace:FILE[,loop]; the window also knows mouse and mouse-dwell";
+
 /// `fovea gaze`.
 #[derive(Clone, Debug, Args)]
 #[command(group = clap::ArgGroup::new("what").required(true))]
@@ -14,9 +17,8 @@ pub struct GazeArgs {
     /// List the sources that can be reached now
     #[arg(long, group = "what", conflicts_with_all = ["record", "seconds"])]
     pub list: bool,
-    /// Watch this source: mouse, mouse-dwell, opengaze[:HOST[:PORT]], lsl[:name=N,type=T,...],
-    /// pupil[:HOST[:PORT]][/SURFACE] or trace:FILE[,loop]
-    #[arg(long, group = "what", value_name = "SRC")]
+    /// Watch this source.
+    #[arg(long, group = "what", value_name = "SRC", help = SOURCES)]
     pub source: Option<SourceSpec>,
     /// Record it to this file, which must not exist
     #[arg(long, requires = "source", value_name = "FILE")]

@@ -95,7 +95,7 @@ impl Session {
                 return Err(Ended::Failed(format!("the tracker refuses {id}")));
             }
             ("NACK", Some(id)) if id.starts_with("CALIBRATE") => {
-                self.calibrated(outlet, Calibration::Failed(id.to_owned()))
+                self.calibrated(outlet, Calibration::Failed(id.to_owned()));
             }
             ("CAL", Some("CALIB_RESULT")) if self.calibrating.is_some() => {
                 stream.write_all(

@@ -126,9 +126,8 @@ impl DotRun {
             let error = angle_between_deg(mean, dot.target_deg);
             result.accuracy_deg += error;
             result.worst_deg = result.worst_deg.max(error);
-            for axis in 0..2 {
-                result.offset_deg[axis] += mean[axis] - dot.target_deg[axis];
-            }
+            let [x, y] = result.offset_deg;
+            result.offset_deg = [x + mean[0] - dot.target_deg[0], y + mean[1] - dot.target_deg[1]];
             result.dots += 1;
             for pair in dot.samples.windows(2) {
                 squares += angle_between_deg(pair[0], pair[1]).powi(2);
@@ -146,7 +145,6 @@ impl DotRun {
 }
 
 #[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
 

@@ -78,7 +78,7 @@ impl GazeControl {
         let mut choices = args.gaze.sources.clone();
         usual.for_each(|spec| {
             if !choices.contains(&spec) {
-                choices.push(spec)
+                choices.push(spec);
             }
         });
         let asked = args.sampling.screen_mm.is_some();

@@ -64,7 +64,7 @@ impl Screenshot {
             let texels: Vec<[u8; 4]> = image.pixels.iter().map(|pixel| pixel.to_array()).collect();
             let size = image.size.map(|side| side as u32);
             let written = png::write(&self.path, size[0], size[1], &texels);
-            self.leave(ctx, written.map(|()| self.figures(state, gaze())).map_err(Into::into));
+            self.leave(ctx, written.map(|()| self.figures(state, &gaze())).map_err(Into::into));
             return;
         }
         let failed = state.picture.is_none() && state.busy.is_none();
@@ -105,7 +105,7 @@ impl Screenshot {
         ctx.send_viewport_cmd(ViewportCommand::Close);
     }
 
-    fn figures(&self, state: &State, gaze: Value) -> Value {
+    fn figures(&self, state: &State, gaze: &Value) -> Value {
         let readout = &state.readout;
         let now = Instant::now();
         let (halfway, traced) = self.halfway.unwrap_or((now, readout.traced));

@@ -25,5 +25,5 @@ fn every_input_that_fuzzing_found_keeps_the_parsers_properties() {
         assert!(of_target >= 2, "{target} has {of_target} inputs");
         inputs += of_target;
     }
-    println!("{inputs} inputs");
+    eprintln!("{inputs} inputs");
 }

@@ -70,15 +70,15 @@ fn measure(rate_hz: f64, noise_deg: f64, secs: f64, settings: FilterSettings) ->
 
 #[test]
 fn the_filter_is_steady_in_fixation_and_lands_with_the_eye() {
-    println!(
+    eprintln!(
         "| rate Hz | noise deg | rms deg, 2-D | rms deg, axis | raw rms deg, 2-D | landing ms, median | landing ms, p95 | false resets/s | saccades |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|");
+    eprintln!("|---|---|---|---|---|---|---|---|---|");
     for (rate_hz, noise_deg) in [(60.0, 0.3), (120.0, 0.3), (150.0, 0.3), (250.0, 0.3), (120.0, 0.1), (120.0, 1.0)] {
         let found = measure(rate_hz, noise_deg, 600.0, FilterSettings::default());
         let Figures { rms_deg, axis_rms_deg, raw_rms_deg, landing_ms: [median, p95], false_resets_per_s, saccades } =
             found;
-        println!(
+        eprintln!(
             "| {rate_hz} | {noise_deg} | {rms_deg:.3} | {axis_rms_deg:.3} | {raw_rms_deg:.3} | {median:.1} | {p95:.1} | \
              {false_resets_per_s:.4} | {saccades} |"
         );

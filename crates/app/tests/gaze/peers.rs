@@ -78,7 +78,7 @@ fn check_counting(samples: &[GazeSample], source: &dyn GazeSource) {
     let mut ages: Vec<f64> =
         samples.iter().rev().take(240).map(|s| (s.arrived - s.captured).as_secs_f64() * 1e3).collect();
     ages.sort_by(f64::total_cmp);
-    println!("age {:.2} ms median, {:.2} ms largest", ages[ages.len() / 2], ages[ages.len() - 1]);
+    eprintln!("age {:.2} ms median, {:.2} ms largest", ages[ages.len() / 2], ages[ages.len() - 1]);
     assert!(ages[ages.len() / 2] < 20.0, "{ages:?}");
 }
 

@@ -79,7 +79,7 @@ fn one_trace_through_every_protocol_gives_the_same_gaze() {
                 }));
                 let apart = |(a, b): (&[f64; 2], &[f64; 2])| (a[0] - b[0]).hypot(a[1] - b[1]);
                 let worst = gaze.iter().zip(&expected).map(apart).fold(0.0, f64::max);
-                println!("{spec}: filtered gaze within {worst:.1e} degrees");
+                eprintln!("{spec}: filtered gaze within {worst:.1e} degrees");
                 // A fraction of 6e-6 of 44 degrees, twice for the two axes, plus the smoothing's dependence on the time.
                 assert!(gaze.len() == expected.len() && worst < 2e-3, "{spec}: {worst} degrees");
             })
@@ -117,7 +117,7 @@ fn synchronised_clocks_give_whole_ages() {
         let mut ages: Vec<f64> = samples[60..].iter().map(|s| (s.arrived - s.captured).as_secs_f64() * 1e3).collect();
         ages.sort_by(f64::total_cmp);
         let median = ages[ages.len() / 2];
-        println!("{spec}: age {median:.2} ms median");
+        eprintln!("{spec}: age {median:.2} ms median");
         assert!(median < most, "{spec}: {median} ms");
     }
 }

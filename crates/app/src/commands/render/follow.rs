@@ -163,7 +163,7 @@ mod tests {
             .map(|step| {
                 format!(
                     "{},{},0.5,{},1\n",
-                    step as f64 * 0.01,
+                    f64::from(step) * 0.01,
                     if step < 25 { 0.25 } else { 0.75 },
                     u8::from(step != 50)
                 )
@@ -175,7 +175,7 @@ mod tests {
         let steps = shared_out(&looked, total);
         assert_eq!(steps.last().unwrap().samples, total);
         assert!(steps.windows(2).all(|pair| pair[0].samples < pair[1].samples));
-        let left = steps.iter().filter(|step| step.gaze.on_view.x < 0.0).last().unwrap().samples;
+        let left = steps.iter().rfind(|step| step.gaze.on_view.x < 0.0).unwrap().samples;
         assert!((left as f64 / total as f64 - 0.25).abs() < 0.01, "{left}");
     }
 

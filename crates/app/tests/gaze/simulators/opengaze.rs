@@ -89,7 +89,7 @@ fn client(mut stream: TcpStream, trace: &Arc<Trace>, stop: &Stop) {
 
 /// As the tracker writes it: five digits, and now and then no blank between attributes.
 fn record(count: u32, row: &Row, enabled: Enabled) -> String {
-    let blank = if count % 3 == 0 { "" } else { " " };
+    let blank = if count.is_multiple_of(3) { "" } else { " " };
     let mut text = String::from("<REC");
     if enabled.counter {
         text += &format!(" CNT=\"{count}\"");
