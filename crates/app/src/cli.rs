@@ -9,10 +9,12 @@ use crate::sampling::Acuity;
 use crate::screen::ScreenGeometry;
 
 pub mod choices;
+pub mod gaze;
 pub mod sampler;
 pub mod values;
 
 use choices::{Clip, EccentricityAt, Geometry, InverseForm, Mode, Model, Orient, Sequence, ToneMapping};
+use gaze::{GazeArgs, PreviewGazeArgs};
 use sampler::SamplerArgs;
 use values::{CameraChoice, FilmShape, GazeAngles, Rgb, SizeMm, SizePx, ViewAngles};
 
@@ -37,6 +39,8 @@ pub enum Command {
     Info(InfoArgs),
     /// List the graphics adapters and which one would be used
     Adapters(AdaptersArgs),
+    /// List gaze sources, watch one, or record one
+    Gaze(GazeArgs),
     /// Compare the sampler's inverses in error and speed, or evaluate one
     Sampler(SamplerArgs),
 }
@@ -59,6 +63,9 @@ pub struct PreviewArgs {
     /// Where eccentricity is measured: at the eye before the screen, or in the scene
     #[arg(long, value_enum, default_value_t = EccentricityAt::Eye, value_name = "PLACE")]
     pub eccentricity: EccentricityAt,
+    /// Where the gaze comes from.
+    #[command(flatten)]
+    pub gaze: PreviewGazeArgs,
     /// The window's size when it opens, pixels
     #[arg(long, default_value = "1280x720", value_name = "WxH")]
     pub window: SizePx,
@@ -101,6 +108,9 @@ pub struct RenderArgs {
     /// Where one looks, degrees from the film's centre, + to the right and + up
     #[arg(long, allow_hyphen_values = true, default_value = "0,0", value_name = "YAW,PITCH")]
     pub gaze: GazeAngles,
+    /// Follow a recorded gaze: samples are shared out over the recording's time (mode fv; the screen shows --view)
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["gaze", "seconds"])]
+    pub gaze_trace: Option<PathBuf>,
     /// Clip foveated samples to the view and a margin
     #[arg(long, value_enum, default_value_t = Clip::None, value_name = "CLIP")]
     pub clip: Clip,
@@ -209,15 +219,14 @@ pub struct SamplingArgs {
     /// [default: 0.002; none with --inverse eq6]
     #[arg(long, allow_negative_numbers = true, value_parser = values::unit_interval, value_name = "M")]
     pub floor: Option<f64>,
-    /// The whole screen, millimetres (with --eccentricity eye)
-    #[arg(long, default_value = "531x299", value_name = "WxH")]
-    pub screen_mm: SizeMm,
-    /// From the eye to the screen, millimetres (with --eccentricity eye)
-    #[arg(
-        long, allow_negative_numbers = true, default_value_t = 650.0,
-        value_parser = values::distance_mm, value_name = "MM"
-    )]
-    pub distance_mm: f32,
+    /// The whole screen, millimetres (with --eccentricity eye) [default: in the window what was last set or the monitor
+    /// says, else 531x299]
+    #[arg(long, value_name = "WxH")]
+    pub screen_mm: Option<SizeMm>,
+    /// From the eye to the screen, millimetres (with --eccentricity eye) [default: in the window what was last set, else
+    /// 650]
+    #[arg(long, allow_negative_numbers = true, value_parser = values::distance_mm, value_name = "MM")]
+    pub distance_mm: Option<f32>,
     /// Indirect bounces; higher shows more of the light that goes through many surfaces, and costs time
     #[arg(
         long, allow_negative_numbers = true, default_value_t = 8,
@@ -235,13 +244,21 @@ pub struct SamplingArgs {
 impl SamplingArgs {
     /// What the foveated mode goes by.
     pub fn acuity(&self) -> Acuity {
-        Acuity { model: self.model, geometry: self.geometry, inverse: self.inverse, floor: self.floor }
+        Acuity {
+            model: self.model,
+            geometry: self.geometry,
+            inverse: self.inverse,
+            floor: self.floor,
+            gaze_error_deg: 0.0,
+        }
     }
 
     /// The screen before the eye.
     pub fn screen(&self) -> ScreenGeometry {
-        let SizeMm { width, height } = self.screen_mm;
-        ScreenGeometry { width_mm: width, height_mm: height, distance_mm: self.distance_mm }
+        let usual = ScreenGeometry::default();
+        let size = self.screen_mm.unwrap_or(SizeMm { width: usual.width_mm, height: usual.height_mm });
+        let distance_mm = self.distance_mm.unwrap_or(usual.distance_mm);
+        ScreenGeometry { width_mm: size.width, height_mm: size.height, distance_mm }
     }
 }
 

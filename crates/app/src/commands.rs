@@ -8,6 +8,7 @@ use serde_json::Value;
 use crate::cli::{Cli, Command};
 
 pub mod adapters;
+pub mod gaze;
 pub mod info;
 pub mod render;
 pub mod sampler;
@@ -22,6 +23,7 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Some(Command::Render(args)) => render::run(&args),
         Some(Command::Info(args)) => info::run(&args),
         Some(Command::Adapters(args)) => adapters::run(&args),
+        Some(Command::Gaze(args)) => gaze::run(&args),
         Some(Command::Sampler(args)) => sampler::run(&args),
     }
 }

@@ -8,6 +8,7 @@
 pub mod cli;
 pub mod commands;
 pub mod film;
+pub mod gaze;
 pub mod output;
 pub mod preview;
 pub mod readback;

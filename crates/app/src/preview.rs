@@ -8,15 +8,19 @@ use tracer::gpu::{AdapterSelect, Gpu};
 
 use crate::cli::PreviewArgs;
 use crate::commands::print_json;
+use crate::gaze::hub::GazeHub;
 use crate::session::{self, Source};
 use controls::Controls;
 use engine::{Engine, Request};
+use gaze_control::GazeControl;
 use screenshot::{Outcome, Screenshot};
 use window::Window;
 
 pub mod controls;
 pub mod engine;
 pub mod gaze;
+pub mod gaze_control;
+pub mod gaze_panel;
 pub mod navigation;
 pub mod overlay;
 pub mod pacing;
@@ -35,6 +39,7 @@ pub fn run(args: PreviewArgs) -> anyhow::Result<()> {
         // A window that opens only to say that the file is missing helps nobody.
         std::fs::File::open(path).with_context(|| path.display().to_string())?;
     }
+    let gaze = Arc::new(GazeHub::new(&args.gaze.sources, args.gaze.accuracy_deg)?);
     let select = args.scene.adapter.clone().map_or(AdapterSelect::Auto, AdapterSelect::Named);
     let outcome = Outcome::default();
     let options = eframe::NativeOptions {
@@ -58,9 +63,10 @@ pub fn run(args: PreviewArgs) -> anyhow::Result<()> {
         let gpu = Gpu::adopt(state.adapter.clone(), state.device.clone(), state.queue.clone())?;
         let adapter = gpu.info().name.clone();
         let ctx = creation.egui_ctx.clone();
-        let engine = Engine::start(gpu, &args, move || ctx.request_repaint())?;
+        let engine = Engine::start(gpu, &args, Arc::clone(&gaze), move || ctx.request_repaint())?;
         engine.request(Request::Open(source));
-        Ok(Box::new(Window::new(engine, adapter, Controls::from(&args), screenshot)))
+        let gaze = GazeControl::new(gaze, &args);
+        Ok(Box::new(Window::new(engine, adapter, Controls::from(&args), gaze, screenshot)))
     });
     eframe::run_native("fovea", options, creator).map_err(explain)?;
     let outcome = outcome.lock().unwrap_or_else(PoisonError::into_inner).take();

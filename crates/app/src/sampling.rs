@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use anyhow::Context;
-use fovea_sampler::{Angle, Form, Inverse, RadialDistribution, model};
+use fovea_sampler::{AcuityModel, Angle, Eccentricity, Form, Inverse, RadialDistribution, model};
 use glam::{Quat, Vec2};
 use tracer::distribution::{Clip as TracerClip, Distribution, Gaze, View};
 use tracer::film::FilmOptions;
@@ -30,6 +30,39 @@ pub struct Acuity {
     pub inverse: Option<InverseForm>,
     /// Acuity below which no direction falls; 0.002 without, none for Eq. 6.
     pub floor: Option<f64>,
+    /// How far off the gaze may be, degrees: the model's centre becomes that much wider. Eq. 6 as printed stays as it is.
+    pub gaze_error_deg: f64,
+}
+
+/// A model for a gaze that is known to within an error: the acuity of the nearest place that the eye may look at.
+#[derive(Debug)]
+struct Widened {
+    model: Box<dyn AcuityModel>,
+    error_deg: f64,
+}
+
+impl AcuityModel for Widened {
+    fn name(&self) -> &str {
+        self.model.name()
+    }
+
+    fn citation(&self) -> &str {
+        self.model.citation()
+    }
+
+    fn acuity(&self, e: Eccentricity) -> f64 {
+        self.model.acuity(Angle::from_degrees((e.degrees() - self.error_deg).max(0.0)))
+    }
+
+    fn breakpoints(&self) -> Vec<Eccentricity> {
+        let moved = self.model.breakpoints().into_iter().map(|e| e.degrees() + self.error_deg);
+        let kinks = std::iter::once(self.error_deg).chain(moved).filter(|degrees| *degrees < 180.0);
+        kinks.map(Angle::from_degrees).collect()
+    }
+
+    fn support(&self) -> Eccentricity {
+        Angle::from_degrees((self.model.support().degrees() + self.error_deg).min(180.0))
+    }
 }
 
 impl Acuity {
@@ -45,6 +78,8 @@ impl Acuity {
         };
         let model = model::by_name(self.model.sampler_name())
             .with_context(|| format!("the sampler has no model {}", self.model.sampler_name()))?;
+        let widens = self.gaze_error_deg > 0.0 && self.inverse != Some(InverseForm::Eq6);
+        let model = if widens { Box::new(Widened { model, error_deg: self.gaze_error_deg }) } else { model };
         let radial = RadialDistribution::from_arc(
             Arc::from(model),
             geometry,
@@ -148,14 +183,38 @@ mod tests {
     #[test]
     fn every_model_has_an_inverse_on_the_sphere() {
         for (model, _) in Model::LIST {
-            let acuity = Acuity { model, geometry: Geometry::Sphere, inverse: None, floor: None };
-            acuity.inverse().unwrap();
+            for gaze_error_deg in [0.0, 0.3, 1.0, 1.4, 3.0] {
+                let acuity = Acuity { model, geometry: Geometry::Sphere, inverse: None, floor: None, gaze_error_deg };
+                acuity.inverse().unwrap();
+            }
+        }
+    }
+
+    #[test]
+    fn an_uncertain_gaze_keeps_full_acuity_wherever_the_eye_may_look() {
+        for (model, _) in Model::LIST {
+            let plain = model::by_name(model.sampler_name()).unwrap();
+            let wide = Widened { model: model::by_name(model.sampler_name()).unwrap(), error_deg: 1.5 };
+            for step in 0..1200 {
+                let e = f64::from(step) * 0.1;
+                // The eye may look anywhere within 1.5 degrees of the gaze.
+                let needed =
+                    [-1.5, -0.7, 0.0, 0.7, 1.5].map(|off: f64| plain.acuity(Angle::from_degrees((e + off).abs())));
+                let given = wide.acuity(Angle::from_degrees(e));
+                assert!(needed.iter().all(|acuity| given >= acuity - 1e-12), "{model:?} at {e} degrees");
+            }
         }
     }
 
     #[test]
     fn eq_6_is_planar_and_says_so() {
-        let acuity = |geometry| Acuity { model: Model::Reddy, geometry, inverse: Some(InverseForm::Eq6), floor: None };
+        let acuity = |geometry| Acuity {
+            model: Model::Reddy,
+            geometry,
+            inverse: Some(InverseForm::Eq6),
+            floor: None,
+            gaze_error_deg: 0.0,
+        };
         let printed = acuity(Geometry::Plane).inverse().unwrap();
         assert_eq!(printed.eval(1.0), Inverse::eq6().eval(1.0));
         let refused = acuity(Geometry::Sphere).inverse().unwrap_err();

@@ -111,6 +111,9 @@ fn bad_input_is_refused_in_one_line_and_no_file_is_touched() {
     refuses(&["render", scene, "-o", text(&folder.path("no/such/folder/out.png"))], &["out.png", "cannot be written"]);
     refuses(&["render", scene], &["--output"]);
     refuses(&["info", text(&missing)], &["missing.glb"]);
+    refuses(&["render", scene, "-o", out, "--gaze-trace", text(&broken)], &["broken.glb", "gaze-trace v1"]);
+    refuses(&["render", scene, "-o", out, "--gaze-trace", scene, "--mode", "od"], &["--gaze-trace", "--mode fv"]);
+    refuses(&["--gaze", "trace:missing.csv"], &["missing.csv"]);
     refuses(&["--frobnicate"], &["--frobnicate"]);
     refuses(&[text(&missing)], &["missing.glb"]);
 
@@ -149,6 +152,75 @@ fn an_exr_holds_every_sample_and_the_same_command_gives_the_same_bytes() {
 
     json(&arguments(text(&second)));
     assert_eq!(std::fs::read(&first).unwrap(), std::fs::read(&second).unwrap());
+}
+
+/// A trace that looks left of the film's centre for a second and right of it for two.
+fn trace(folder: &Folder) -> PathBuf {
+    let rows = (0..300).map(|step| {
+        let yaw = if step < 100 { -45 } else { 45 };
+        format!("{:.2},{yaw},0,{}\n", f64::from(step) * 0.01, u8::from(step % 50 != 20))
+    });
+    let path = folder.path("gaze.csv");
+    let text = format!("# gaze-trace v1; source=test; space=view_deg; rate_hz=100\n{}", rows.collect::<String>());
+    std::fs::write(&path, text).unwrap();
+    path
+}
+
+#[test]
+fn a_render_follows_a_recorded_gaze_and_is_the_same_every_time() {
+    let folder = Folder::new("trace");
+    let (scene, trace) = (folder.path("square.gltf"), trace(&folder));
+    let render = |out: &str| {
+        let film = ["--film", "equirect:64x32", "--samples", "60000", "--json", "--gaze-trace", text(&trace)];
+        json(&[&["render", text(&scene), "-o", out], film.as_slice()].concat())
+    };
+    let (first, second) = (folder.path("1.exr"), folder.path("2.exr"));
+    let report = render(text(&first));
+    assert_eq!((report["samples"].as_u64(), report["gaze_trace"].as_str()), (Some(60_000), Some("gaze.csv")));
+    let film = exr::read(&first).unwrap();
+    assert_eq!(film.settings["gaze_trace"], "gaze.csv");
+    // 45 degrees are 8 of 64 columns.
+    let about = |column: usize| -> f64 {
+        (12..20)
+            .flat_map(|y| (column - 3..column + 3).map(move |x| (x, y)))
+            .map(|(x, y)| f64::from(film.samples[y * 64 + x]))
+            .sum()
+    };
+    let (left, centre, right) = (about(24), about(32), about(40));
+    assert!((right / left - 2.0).abs() < 0.4, "two thirds of the time at the right: {left} {centre} {right}");
+    assert!(left > 1.5 * centre, "{left} {centre} {right}");
+    render(text(&second));
+    assert_eq!(std::fs::read(&first).unwrap(), std::fs::read(&second).unwrap());
+}
+
+#[test]
+fn gaze_is_listed_watched_and_recorded() {
+    let folder = Folder::new("gaze");
+    let trace = trace(&folder);
+    let source = format!("trace:{}", text(&trace));
+    let copy = folder.path("copy.csv");
+    let figures = json(&["gaze", "--source", &source, "--record", text(&copy), "--json"]);
+    assert_eq!((figures["samples"].as_u64(), figures["valid"].as_u64()), (Some(300), Some(294)));
+    assert!((figures["rate_hz"].as_f64().unwrap() - 100.0).abs() < 1.0, "{figures}");
+    // The recording plays back as the trace: the same rows, of the same space.
+    let rows = |path: &Path| -> Vec<String> {
+        let text = std::fs::read_to_string(path).unwrap();
+        let numbers = text.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit()));
+        numbers
+            .map(|line| {
+                line.split(',').map(|field| field.parse::<f64>().unwrap().to_string()).collect::<Vec<_>>().join(",")
+            })
+            .collect()
+    };
+    assert_eq!(rows(&trace), rows(&copy));
+    refuses(&["gaze", "--source", &source, "--record", text(&copy)], &["copy.csv", "overwrites nothing"]);
+    refuses(&["gaze", "--source", "trace:missing.csv"], &["missing.csv", "No such file"]);
+    refuses(&["gaze", "--source", text(&copy)], &["no gaze source"]);
+    refuses(&["gaze", "--source", "opengaze::1", "--seconds", "0.6"], &["opengaze:127.0.0.1:1", "refused"]);
+    let listed = json(&["gaze", "--list", "--json"]);
+    let names: Vec<_> =
+        listed["sources"].as_array().unwrap().iter().map(|row| row["source"].as_str().unwrap()).collect();
+    assert!(names.contains(&"mouse") && names.contains(&"opengaze:127.0.0.1:4242"), "{names:?}");
 }
 
 #[test]

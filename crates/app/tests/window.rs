@@ -39,7 +39,7 @@ impl Display {
     }
 
     /// Opens the built-in scene, does `actions` once there is a window, and returns what the window showed and said.
-    fn session(&self, seconds: u32, actions: impl Fn(&Self)) -> (RgbImage, Value) {
+    fn session(&self, seconds: u32, options: &[&str], actions: impl Fn(&Self)) -> (RgbImage, Value) {
         let picture = std::env::temp_dir().join(format!(
             "fovea-window-{}-{}.png",
             std::process::id(),
@@ -48,6 +48,9 @@ impl Display {
         let mut window = Command::new(env!("CARGO_BIN_EXE_fovea"))
             .env("DISPLAY", &self.name)
             .env_remove("WAYLAND_DISPLAY")
+            // What somebody has set for their own screen is not the test's.
+            .env("XDG_CONFIG_HOME", std::env::temp_dir().join("fovea-window-test-settings"))
+            .args(options)
             .args(["--screenshot-after", &seconds.to_string(), "--screenshot", picture.to_str().unwrap()])
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -102,7 +105,7 @@ fn the_fovea_follows_the_pointer_and_most_of_the_time_goes_into_tracing() {
     };
     let (left, right, y) = (480, 1060, 420);
     for (gaze, other) in [(left, right), (right, left)] {
-        let (shown, figures) = display.session(8, |display| {
+        let (shown, figures) = display.session(8, &[], |display| {
             display.xdotool(&format!("mousemove {gaze} {y}"));
             std::thread::sleep(Duration::from_millis(500));
             // The film starts again, so that nothing in it is older than the gaze; the picture shows its density.
@@ -119,4 +122,45 @@ fn the_fovea_follows_the_pointer_and_most_of_the_time_goes_into_tracing() {
         assert!(number("tracing_share") > 0.6, "{figures}");
         eprintln!("gaze at {gaze}: density ratio {ratio:.2}, {figures}");
     }
+}
+
+#[test]
+fn a_trackers_gaze_reaches_the_next_batch_wherever_the_pointer_is() {
+    let Some(display) = Display::start() else {
+        eprintln!("SKIP a_trackers_gaze_reaches_the_next_batch_wherever_the_pointer_is: Xvfb or xdotool is missing");
+        return;
+    };
+    // Two seconds at 120 Hz at a point of the screen, which the window fills; the pointer is elsewhere.
+    let (gaze_x, pointer_x, y) = (1060, 480, 420);
+    let rows = (0..240).map(|step| {
+        let time = f64::from(step) / 120.0;
+        format!("{time:.6},{:.6},{:.6},1,1\n", f64::from(gaze_x) / 1280.0, f64::from(y) / 720.0)
+    });
+    let text = format!("# gaze-trace v1; space=screen01; rate_hz=120\n{}", rows.collect::<String>());
+    let trace = std::env::temp_dir().join(format!("fovea-window-gaze-{}.csv", std::process::id()));
+    std::fs::write(&trace, text).unwrap();
+    let source = format!("trace:{},loop", trace.display());
+    let (shown, figures) = display.session(8, &["--gaze", &source], |display| {
+        display.xdotool(&format!("mousemove {pointer_x} {y}"));
+        std::thread::sleep(Duration::from_millis(1500));
+        display.xdotool("key r");
+        display.xdotool("key x");
+        display.xdotool("key g");
+    });
+    std::fs::remove_file(trace).unwrap();
+    let gaze = &figures["gaze"];
+    assert_eq!(
+        (gaze["sources"][0]["active"].as_bool(), gaze["position_known"].as_bool()),
+        (Some(true), Some(true)),
+        "{gaze}"
+    );
+    let ratio = brightness(&shown, gaze_x, y) / brightness(&shown, pointer_x, y);
+    assert!(ratio > 1.2, "density {ratio} times that at the pointer; {figures}");
+    // A sample waits for the batch that is under way, with its picture, never longer.
+    let ms = |key: &str| gaze[key].as_f64().unwrap();
+    let (longest, frame) = (ms("longest_arrival_to_batch_ms"), ms("longest_batch_interval_ms"));
+    assert!(ms("arrival_to_batch_ms") <= longest && longest <= frame, "{gaze}");
+    assert!(longest > 8.4, "samples that come during a batch count too: {gaze}");
+    assert!(ms("age_ms") > 0.0, "{gaze}");
+    eprintln!("density ratio {ratio:.2}, {figures}");
 }

@@ -54,7 +54,7 @@ fn every_option_of_render_is_read() {
     assert_eq!((args.scene.sun_angle, args.scene.file.gltf_scene, args.scene.file.time), (0.53, Some(1), Some(-0.5)));
     assert_eq!(args.scene.file.variant.as_deref(), Some("beach"));
     assert_eq!((args.scene.env_rotate, args.picture.exposure), (-90.0, -1.5));
-    assert_eq!(args.sampling.screen_mm, SizeMm { width: 600.0, height: 340.0 });
+    assert_eq!(args.sampling.screen_mm, Some(SizeMm { width: 600.0, height: 340.0 }));
     assert_eq!(render("-o a.exr --camera 2").scene.camera, Some(CameraChoice::Index(2)));
     assert_eq!(render("-o a.exr --background 1,0.5,0").scene.background, Some(Rgb([1.0, 0.5, 0.0])));
 }
@@ -85,6 +85,13 @@ fn wrong_values_are_refused_in_one_line_that_names_the_option_and_the_cause() {
         ("fovea render a.glb", "--output", "required"),
         ("fovea render -o a.exr --spp 1 --seconds 1", "--spp", "cannot be used"),
         ("fovea render -o a.exr --env a.hdr --background 1,1,1", "--env", "cannot be used"),
+        ("fovea render -o a.exr --gaze 1,2 --gaze-trace a.csv", "--gaze", "cannot be used"),
+        ("fovea render -o a.exr --gaze-trace a.csv --seconds 1", "--seconds", "cannot be used"),
+        ("fovea --gaze moose", "--gaze", "mouse-dwell"),
+        ("fovea --gaze-accuracy -1", "--gaze-accuracy", "0..=20"),
+        ("fovea gaze", "--list", "required"),
+        ("fovea gaze --list --source mouse", "--list", "cannot be used"),
+        ("fovea gaze --list --record a.csv", "--list", "cannot be used"),
         ("fovea --no-such-thing", "--no-such-thing", "unexpected"),
     ] {
         let message = complaint(line);

@@ -186,6 +186,11 @@ pub fn sun_angle_deg(text: &str) -> Result<f32, String> {
     in_range(text, 0.0, 180.0, "degrees")
 }
 
+/// Degrees, 0..=20.
+pub fn accuracy_deg(text: &str) -> Result<f64, String> {
+    in_range(text, 0.0, 20.0, "degrees").map(f64::from)
+}
+
 /// Seconds, above 0 and at most 1e7.
 pub fn positive_seconds(text: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;

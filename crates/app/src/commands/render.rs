@@ -8,7 +8,7 @@ use anyhow::{Context, bail};
 use glam::{Quat, Vec2};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
-use tracer::distribution::View;
+use tracer::distribution::{Distribution, View};
 use tracer::film::{FilmMapping, FilmOptions};
 use tracer::gpu::{AdapterSelect, Gpu};
 use tracer::renderer::{FilmPose, RenderStatistics, Renderer, RendererOptions, SceneReport, StopCondition};
@@ -25,6 +25,9 @@ use crate::sampling::{Aim, GazePoint};
 use crate::session::{self, Loaded, Source, Viewpoint};
 use crate::settings::{RunSettings, mode_name};
 use crate::view::direction;
+use follow::Step;
+
+mod follow;
 
 /// Samples a film pixel unless told otherwise.
 const DEFAULT_SPP: u64 = 16;
@@ -55,6 +58,10 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     }
     let pose = FilmPose { position: camera.position, world_from_film: world_from_film(args, camera) };
     let aim = aim(args, &film, pose.world_from_film)?;
+    let steps = match &args.gaze_trace {
+        Some(path) => follow::steps(path, args, &aim.view, samples(&args.stop, &film))?,
+        None => Vec::new(),
+    };
     let inverse = args.sampling.acuity().inverse()?;
     let options = RendererOptions {
         film,
@@ -69,7 +76,12 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         dump_kernels(&renderer, folder)?;
     }
 
-    let seconds = trace(&mut renderer, stop(&args.stop, &film))?;
+    let seconds = if steps.is_empty() {
+        trace(&mut renderer, stop(&args.stop, &film))?
+    } else {
+        let at = |gaze| Aim { gaze, ..aim }.distribution(&film, pose.world_from_film, &inverse);
+        trace_steps(&mut renderer, &steps, at)?
+    };
     let settings = RunSettings {
         scene: &scene,
         renderer: &options,
@@ -79,7 +91,9 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         samples: renderer.samples(),
     };
     match format {
-        ImageFormat::Exr => exr::write(&args.output, FilmFile::new(&renderer.snapshot()?, settings.to_json()))?,
+        ImageFormat::Exr => {
+            exr::write(&args.output, FilmFile::new(&renderer.snapshot()?, with_trace(settings.to_json(), args)))?;
+        }
         ImageFormat::Png => {
             let texels = readback::draw(&mut renderer, &whole_film(args, &film))?;
             png::write(&args.output, film.width, film.height, &texels)?;
@@ -87,7 +101,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     }
     if args.json {
         let run = Run { seconds, import_seconds, prepared, statistics: renderer.statistics()? };
-        return print_json(&run.to_json(&gpu, &settings));
+        return print_json(&with_trace(run.to_json(&gpu, &settings), args));
     }
     Ok(())
 }
@@ -147,23 +161,57 @@ fn aim(args: &RenderArgs, film: &FilmOptions, world_from_film: Quat) -> anyhow::
 }
 
 fn stop(args: &StopArgs, film: &FilmOptions) -> StopCondition {
-    match (args.samples, args.seconds) {
-        (Some(samples), _) => StopCondition::Samples(samples),
-        (None, Some(seconds)) => StopCondition::Seconds(seconds),
-        (None, None) => StopCondition::Samples(args.spp.unwrap_or(DEFAULT_SPP).saturating_mul(film.pixels())),
-    }
+    args.seconds.map_or_else(|| StopCondition::Samples(samples(args, film)), StopCondition::Seconds)
 }
 
-/// Traces with a progress bar on a terminal; returns the seconds of tracing.
-fn trace(renderer: &mut Renderer, stop: StopCondition) -> anyhow::Result<f64> {
-    const STEPS: u64 = 1000;
-    let bar = if std::io::stderr().is_terminal() { ProgressBar::new(STEPS) } else { ProgressBar::hidden() };
+/// Samples in all, unless a time is given.
+fn samples(args: &StopArgs, film: &FilmOptions) -> u64 {
+    args.samples.unwrap_or_else(|| args.spp.unwrap_or(DEFAULT_SPP).saturating_mul(film.pixels()))
+}
+
+/// What a report says about the recorded gaze that was followed.
+fn with_trace(mut report: Value, args: &RenderArgs) -> Value {
+    if let Some(path) = &args.gaze_trace {
+        report["gaze_trace"] = path.file_name().map(|name| name.to_string_lossy()).into();
+    }
+    report
+}
+
+/// Steps of a progress bar.
+const BAR_STEPS: u64 = 1000;
+
+fn progress_bar() -> anyhow::Result<ProgressBar> {
+    let bar = if std::io::stderr().is_terminal() { ProgressBar::new(BAR_STEPS) } else { ProgressBar::hidden() };
     let style =
         ProgressStyle::with_template("{bar:40} {percent:>3} %  {elapsed} elapsed, {eta} left").context("style")?;
     bar.set_style(style);
     bar.enable_steady_tick(Duration::from_millis(200));
+    Ok(bar)
+}
+
+/// Traces where somebody looked, step by step, with a progress bar; returns the seconds of tracing.
+fn trace_steps(
+    renderer: &mut Renderer,
+    steps: &[Step],
+    distribution: impl Fn(GazePoint) -> Distribution,
+) -> anyhow::Result<f64> {
+    let bar = progress_bar()?;
+    let total = steps.last().map_or(1, |step| step.samples.max(1));
+    let mut seconds = 0.0;
+    for step in steps {
+        renderer.set_distribution(distribution(step.gaze))?;
+        seconds += renderer.render(StopCondition::Samples(step.samples), |_| true)?;
+        bar.set_position((step.samples as f64 / total as f64 * BAR_STEPS as f64) as u64);
+    }
+    bar.finish_and_clear();
+    Ok(seconds)
+}
+
+/// Traces with a progress bar on a terminal; returns the seconds of tracing.
+fn trace(renderer: &mut Renderer, stop: StopCondition) -> anyhow::Result<f64> {
+    let bar = progress_bar()?;
     let outcome = renderer.render(stop, |fraction| {
-        bar.set_position((fraction * STEPS as f64) as u64);
+        bar.set_position((fraction * BAR_STEPS as f64) as u64);
         true
     });
     bar.finish_and_clear();

@@ -20,6 +20,7 @@ use super::pacing::Pacing;
 use super::tracing::{OpenScene, Tracing};
 use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
+use crate::gaze::hub::{GazeHub, SampleTimes};
 use crate::output::exr;
 use crate::session::{Source, one_line};
 
@@ -41,7 +42,7 @@ const RATE_WINDOW: Duration = Duration::from_millis(800);
 pub struct Look {
     /// Where the viewer is.
     pub standpoint: Standpoint,
-    /// Where the viewer looks.
+    /// Where the viewer looked when the window was drawn; a batch goes by the newest gaze instead.
     pub gaze: Gaze,
     /// Settings.
     pub controls: Controls,
@@ -129,7 +130,12 @@ impl Engine {
     ///
     /// # Errors
     /// When the system gives no thread.
-    pub fn start(gpu: Gpu, args: &PreviewArgs, repaint: impl Fn() + Send + 'static) -> std::io::Result<Self> {
+    pub fn start(
+        gpu: Gpu,
+        args: &PreviewArgs,
+        gaze: Arc<GazeHub>,
+        repaint: impl Fn() + Send + 'static,
+    ) -> std::io::Result<Self> {
         let shared = Arc::new(Shared::default());
         let (requests, inbox) = mpsc::channel();
         let worker = Worker {
@@ -137,6 +143,8 @@ impl Engine {
             inbox,
             pacing: Pacing::new(gpu.is_software()),
             tracing: Tracing::new(gpu, args.clone()),
+            gaze,
+            sample: None,
             repaint: Box::new(repaint),
             shown: None,
             show_time: Duration::ZERO,
@@ -192,6 +200,9 @@ struct Worker {
     shared: Arc<Shared>,
     inbox: Receiver<Request>,
     tracing: Tracing,
+    gaze: Arc<GazeHub>,
+    /// The gaze sample that the last batch went by.
+    sample: Option<SampleTimes>,
     pacing: Pacing,
     repaint: Box<dyn Fn() + Send>,
     shown: Option<Shown>,
@@ -238,6 +249,10 @@ impl Worker {
         if prepares {
             self.busy(Some("preparing the scene".into()));
         }
+        // The window may have been drawn long ago; the eye has moved since.
+        let target = self.gaze.target_for_batch(Instant::now(), &look.standpoint.view);
+        self.sample = target.sample;
+        let look = &Look { gaze: Gaze { point: target.point }, ..look.clone() };
         let changed = self.tracing.follow(look);
         if prepares {
             self.busy(None);
@@ -284,6 +299,7 @@ impl Worker {
             self.show_time = start.elapsed();
         }
         let samples = self.tracing.samples();
+        self.gaze.shown(Instant::now(), self.sample);
         self.shown = Some(Shown { look: look.clone(), samples, coarseness, at: Instant::now() });
         if self.read_at.is_none_or(|at| at.elapsed() >= READ_INTERVAL) {
             self.spp_at_gaze = self.tracing.samples_at(look.standpoint.view.direction_at(look.gaze.point))?;

@@ -1,24 +1,72 @@
-//! The pointer as gaze: where on the screen one looks, and what lies there.
+//! Where in the picture one looks: the pointer over it, the window's place on the desktop, and the ring at the fovea.
 
 use egui::{Color32, Pos2, Rect, Shape, Stroke};
 use glam::Vec2;
 
 use super::navigation::{point_in_view, point_in_window};
+use crate::gaze::geometry::{RectPx, WindowPlace};
 use crate::screen::{FOVEA_DEG, ScreenGeometry};
 
-/// Where one looks, in the view. It stays where it was while the pointer is elsewhere.
+/// Where one looks, in the view.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Gaze {
     /// A point of the view: +-1 at the edges, y up.
     pub point: Vec2,
 }
 
-impl Gaze {
-    /// Follows the pointer while it is over the picture.
-    pub fn update(&mut self, response: &egui::Response) {
-        let pointer = response.hover_pos().or_else(|| response.interact_pointer_pos());
-        if let Some(pointer) = pointer.filter(|pointer| response.rect.contains(*pointer)) {
-            self.point = point_in_view(response.rect, pointer);
+/// The pointer while it is over the picture: +-1 at its edges, y up.
+pub fn pointer(response: &egui::Response) -> Option<[f64; 2]> {
+    let pointer = response.hover_pos().or_else(|| response.interact_pointer_pos());
+    let inside = pointer.filter(|pointer| response.rect.contains(*pointer))?;
+    Some(point_in_view(response.rect, inside).as_dvec2().to_array())
+}
+
+/// A screen of the desktop, and where the window's content begins on it, physical pixels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Desktop {
+    /// The screen that the window is on.
+    pub monitor: RectPx,
+    /// What the system calls that screen, with its size.
+    pub monitor_name: String,
+    /// Top left of the window's content; `None` where the system does not tell, as under Wayland.
+    pub content_origin: Option<[f64; 2]>,
+}
+
+impl Desktop {
+    /// From the window system; `None` when it names no screen.
+    pub fn of(frame: &eframe::Frame) -> Option<Self> {
+        let window = frame.winit_window()?;
+        let monitor = window.current_monitor().or_else(|| window.primary_monitor())?;
+        let (position, size) = (monitor.position(), monitor.size());
+        if size.width == 0 || size.height == 0 {
+            return None;
+        }
+        let content = window.inner_position().ok();
+        Some(Self {
+            monitor: RectPx {
+                origin: [position.x.into(), position.y.into()],
+                size: [size.width.into(), size.height.into()],
+            },
+            monitor_name: format!("{} {}x{}", monitor.name().unwrap_or_default(), size.width, size.height),
+            content_origin: content.map(|origin| [origin.x.into(), origin.y.into()]),
+        })
+    }
+
+    /// Where a picture at `rect` (points of the window) is. A window whose place is not known counts as centred, which is
+    /// right when it fills the screen.
+    pub fn place(&self, rect: Rect, pixels_per_point: f32, screen: ScreenGeometry) -> WindowPlace {
+        let px = |points: f32| f64::from(points * pixels_per_point);
+        let size = [px(rect.width()).max(1.0), px(rect.height()).max(1.0)];
+        let centre = self.monitor.centre();
+        let origin = match self.content_origin {
+            Some(origin) => [origin[0] + px(rect.min.x), origin[1] + px(rect.min.y)],
+            None => [centre[0] - 0.5 * size[0], centre[1] - 0.5 * size[1]],
+        };
+        WindowPlace {
+            monitor: self.monitor,
+            picture: RectPx { origin, size },
+            screen,
+            position_known: self.content_origin.is_some(),
         }
     }
 }
@@ -69,6 +117,18 @@ mod tests {
 
     fn rect() -> Rect {
         Rect::from_min_size(Pos2::ZERO, egui::vec2(1280.0, 720.0))
+    }
+
+    #[test]
+    fn the_picture_is_where_the_window_is() {
+        let monitor = RectPx { origin: [1920.0, 0.0], size: [2560.0, 1440.0] };
+        let mut desktop = Desktop { monitor, monitor_name: String::new(), content_origin: Some([2000.0, 100.0]) };
+        let rect = Rect::from_min_size(egui::pos2(10.0, 20.0), egui::vec2(640.0, 360.0));
+        let place = desktop.place(rect, 2.0, ScreenGeometry::default());
+        assert_eq!(place.picture, RectPx { origin: [2020.0, 140.0], size: [1280.0, 720.0] });
+        desktop.content_origin = None;
+        let place = desktop.place(rect, 2.0, ScreenGeometry::default());
+        assert_eq!((place.picture.centre(), place.position_known), (monitor.centre(), false));
     }
 
     #[test]

@@ -10,7 +10,7 @@ use crate::cli::choices::{Clip, EccentricityAt, Mode, Model};
 const PANEL_WIDTH: f32 = 236.0;
 
 /// What the keys do, as `?` lists them.
-pub const KEYS: [(&str, &str); 15] = [
+pub const KEYS: [(&str, &str); 16] = [
     ("Drag", "look around"),
     ("Wheel", "zoom at the pointer"),
     ("W A S D  Q E", "fly; Shift: faster"),
@@ -20,6 +20,7 @@ pub const KEYS: [(&str, &str); 15] = [
     ("Space", "pause"),
     ("R", "restart"),
     ("F", "ring at the fovea"),
+    ("G", "gaze: sources, drift, recording"),
     ("X", "sample density"),
     ("[  ]", "exposure"),
     ("Ctrl S", "save the picture as PNG"),
@@ -37,11 +38,13 @@ pub struct Visibility {
     pub keys: bool,
     /// The ring at the fovea.
     pub ring: bool,
+    /// The panel about gaze.
+    pub gaze: bool,
 }
 
 impl Default for Visibility {
     fn default() -> Self {
-        Self { panel: true, keys: false, ring: true }
+        Self { panel: true, keys: false, ring: true, gaze: false }
     }
 }
 
@@ -97,7 +100,7 @@ pub fn panel(ctx: &Context, facts: &Facts<'_>, controls: &mut Controls, visibili
             ui.separator();
             ui.collapsing("Sampling and screen", |ui| sampling(ui, facts, controls, visibility));
             notes(ui, facts.notes);
-            ui.label(RichText::new("?  keys      H  hide").small().weak());
+            ui.label(RichText::new("?  keys      G  gaze      H  hide").small().weak());
         });
     });
     actions

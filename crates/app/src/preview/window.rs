@@ -2,14 +2,16 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use egui::{Color32, Context, Key, Modifiers, Rect, Sense, Ui};
 use glam::UVec2;
 
 use super::controls::{Controls, MODES, Shown};
 use super::engine::{Engine, Look, Message, Request, State};
-use super::gaze::{Gaze, ScreenMapping, fovea_ring};
+use super::gaze::{self, Gaze, ScreenMapping, fovea_ring};
+use super::gaze_control::GazeControl;
+use super::gaze_panel;
 use super::navigation::Navigation;
 use super::overlay::{self, Action, Facts, Visibility};
 use super::screenshot::Screenshot;
@@ -29,7 +31,7 @@ pub struct Window {
     adapter: String,
     controls: Controls,
     visibility: Visibility,
-    gaze: Gaze,
+    gaze: GazeControl,
     /// The scene that `navigation` moves in.
     scene: Option<(Arc<OpenScene>, Navigation)>,
     camera: usize,
@@ -39,13 +41,19 @@ pub struct Window {
 
 impl Window {
     /// A window over a running engine.
-    pub fn new(engine: Engine, adapter: String, controls: Controls, screenshot: Option<Screenshot>) -> Self {
+    pub fn new(
+        engine: Engine,
+        adapter: String,
+        controls: Controls,
+        gaze: GazeControl,
+        screenshot: Option<Screenshot>,
+    ) -> Self {
         Self {
             engine,
             adapter,
             controls,
-            visibility: Visibility::default(),
-            gaze: Gaze::default(),
+            visibility: Visibility { gaze: gaze.is_worth_showing(), ..Visibility::default() },
+            gaze,
             scene: None,
             camera: 0,
             texture: None,
@@ -85,14 +93,14 @@ impl Window {
         ui.painter().image(id, rect, whole, Color32::WHITE);
     }
 
-    fn look(&self, ctx: &Context, rect: Rect) -> Option<(Look, f32)> {
+    fn look(&self, ctx: &Context, rect: Rect, gaze: Gaze) -> Option<(Look, f32)> {
         let (_, navigation) = self.scene.as_ref()?;
         let monitor = ctx.input(|input| input.viewport().monitor_size);
         let mapping = ScreenMapping::new(self.controls.screen, rect, monitor);
         let pixels = rect.size() * ctx.pixels_per_point();
         let look = Look {
             standpoint: navigation.standpoint,
-            gaze: self.gaze,
+            gaze,
             controls: self.controls.clone(),
             mapping,
             size_px: UVec2::new(pixels.x.round().max(1.0) as u32, pixels.y.round().max(1.0) as u32),
@@ -118,6 +126,9 @@ impl Window {
                 self.act(action);
             }
         }
+        if self.visibility.gaze && !self.gaze.shows_dots() {
+            gaze_panel::panel(ctx, &mut self.gaze, Instant::now());
+        }
         if self.visibility.keys {
             overlay::keys(ctx);
         }
@@ -131,6 +142,10 @@ impl Window {
         }
         if state.dead {
             overlay::message(ctx, "the renderer has stopped; the terminal says why", true, false);
+            return;
+        }
+        if let Some(note) = self.gaze.note(Instant::now()) {
+            overlay::message(ctx, &note, false, false);
             return;
         }
         let Some(Message { text, wrong, at }) = &state.message else { return };
@@ -194,6 +209,9 @@ impl Window {
         }
         let stops = f32::from(u8::from(plain(Key::CloseBracket))) - f32::from(u8::from(plain(Key::OpenBracket)));
         self.controls.exposure_ev = (self.controls.exposure_ev + 0.5 * stops).clamp(-8.0, 8.0);
+        if plain(Key::G) {
+            self.visibility.gaze = !self.visibility.gaze;
+        }
         if plain(Key::H) {
             self.visibility.panel = !self.visibility.panel;
         }
@@ -202,6 +220,7 @@ impl Window {
         }
         if pressed(Modifiers::NONE, Key::Escape) {
             self.visibility.keys = false;
+            self.gaze.stop_dots();
         }
         let actions = [(exr, Action::SaveExr), (png, Action::SavePng), (restart, Action::Restart)];
         actions.into_iter().filter(|(asked, _)| *asked).for_each(|(_, action)| self.act(action));
@@ -229,20 +248,37 @@ impl eframe::App for Window {
         if let Some((_, navigation)) = &mut self.scene {
             navigation.update(ui, &response);
         }
-        self.gaze.update(&response);
+        let now = Instant::now();
+        let view = self.scene.as_ref().map(|(_, navigation)| navigation.standpoint.view);
+        self.gaze.follow_screen(frame, &mut self.controls, now);
+        let target = view.map(|view| {
+            let place = self.gaze.place(&ctx, rect, self.controls.screen);
+            self.gaze.frame(now, place, view, gaze::pointer(&response))
+        });
+        if let Some(target) = target {
+            self.controls.acuity.gaze_error_deg = target.accuracy_deg;
+        }
         self.show_picture(ui, frame, &state, rect);
         let mut deg_per_px = 0.0;
-        if let Some((look, pixel)) = self.look(&ctx, rect) {
+        let gaze = Gaze { point: target.map(|target| target.point).unwrap_or_default() };
+        if let Some((look, pixel)) = self.look(&ctx, rect, gaze) {
             deg_per_px = pixel;
             if self.visibility.ring && self.controls.mode == Mode::Fv {
-                ui.painter().extend(fovea_ring(&look.mapping, rect, self.gaze));
+                ui.painter().extend(fovea_ring(&look.mapping, rect, gaze));
             }
             self.engine.look(look);
         }
-        self.overlay(&ctx, &state, deg_per_px);
+        gaze_panel::dots(ui, rect, &self.gaze, now);
+        if self.gaze.wants_frames() {
+            ctx.request_repaint_after(self.gaze.frame_interval());
+        }
+        if !self.gaze.shows_dots() {
+            self.overlay(&ctx, &state, deg_per_px);
+        }
+        self.gaze.remember_screen(&self.controls, now);
         self.open_dropped_file(&ctx);
         if let Some(screenshot) = &mut self.screenshot {
-            screenshot.update(&ctx, &state);
+            screenshot.update(&ctx, &state, || self.gaze.figures(now));
         }
     }
 

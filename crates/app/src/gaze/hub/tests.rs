@@ -1,0 +1,150 @@
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use super::*;
+use crate::gaze::drift::DriftCorrection;
+use crate::gaze::geometry::RectPx;
+use crate::screen::ScreenGeometry;
+
+const START_MS: u64 = 10_000;
+
+/// A hub whose preferred source is a recording at 100 Hz: x 0.75 for a second, then nothing for `gap_ms`, then again.
+fn hub(gap_ms: u64) -> (GazeHub, std::path::PathBuf) {
+    let rows = (0..100)
+        .chain(100 + gap_ms / 10..400 + gap_ms / 10)
+        .map(|step| format!("{},0.75,0.5,1,1\n", step as f64 * 0.01));
+    let text = format!("# gaze-trace v1; space=screen01\n{}", rows.collect::<String>());
+    let path = std::env::temp_dir().join(format!("fovea-hub-{gap_ms}-{:?}.csv", std::thread::current().id()));
+    std::fs::write(&path, text).unwrap();
+    (GazeHub::new(&[SourceSpec::Trace(path.clone(), false)], None).unwrap(), path)
+}
+
+fn place() -> WindowPlace {
+    let whole = RectPx { origin: [0.0; 2], size: [1000.0, 500.0] };
+    let screen = ScreenGeometry { width_mm: 500.0, height_mm: 250.0, distance_mm: 600.0 };
+    WindowPlace { monitor: whole, picture: whole, screen, position_known: true }
+}
+
+fn view() -> View {
+    View::new(0.0, 0.0, 1.0, 0.5)
+}
+
+/// Runs so many milliseconds at 100 Hz; what is looked at afterwards.
+fn run(hub: &GazeHub, start: Instant, from_ms: u64, to_ms: u64) -> Target {
+    let mut target = hub.target(start + Duration::from_millis(from_ms), &view());
+    for ms in (from_ms..=to_ms).step_by(10) {
+        let now = start + Duration::from_millis(ms);
+        hub.frame(now, place(), view(), Some([-0.5, 0.25]));
+        target = hub.target_for_batch(now, &view());
+    }
+    target
+}
+
+fn near(target: Target, x: f32, y: f32) -> bool {
+    target.point.distance(Vec2::new(x, y)) < 1e-3
+}
+
+#[test]
+fn a_lost_tracker_gives_way_to_the_pointer_and_comes_back_with_a_note() {
+    let start = Instant::now() + Duration::from_millis(START_MS);
+    let (hub, path) = hub(1500);
+    let first = run(&hub, start, 0, 900);
+    assert!(near(first, 0.5, 0.0), "{first:?}");
+    assert_eq!(first.accuracy_deg, USUAL_ACCURACY_DEG);
+
+    let gap = run(&hub, start, 910, 1300);
+    assert!(near(gap, 0.5, 0.0), "a short gap holds: {gap:?}");
+    let lost = run(&hub, start, 1310, 1800);
+    assert!(near(lost, -0.5, 0.25), "the pointer: {lost:?}");
+    assert_eq!(lost.accuracy_deg, USUAL_ACCURACY_DEG, "another width would compile another kernel");
+    let report = hub.report(start + Duration::from_millis(1800));
+    assert!(
+        report.note.as_ref().is_some_and(|(text, _)| text.contains("lost") && text.contains("mouse")),
+        "{report:?}"
+    );
+    assert_eq!(report.sources.iter().map(|source| source.active).collect::<Vec<_>>(), [false, true]);
+
+    let early = run(&hub, start, 2490, 2600);
+    assert!(near(early, -0.5, 0.25), "not at the first sample: {early:?}");
+    let back = run(&hub, start, 2610, 3500);
+    assert!(near(back, 0.5, 0.0), "{back:?}");
+    let report = hub.report(start + Duration::from_millis(3500));
+    assert!(report.note.is_some_and(|(text, _)| text.contains("trace:")) && report.sources[0].active);
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn before_anything_is_known_the_pointer_is_the_gaze() {
+    let start = Instant::now() + Duration::from_millis(START_MS);
+    let hub = GazeHub::new(&[SourceSpec::OpenGaze("127.0.0.1".into(), 1)], None).unwrap();
+    assert_eq!(
+        hub.target(start, &view()),
+        Target { point: Vec2::ZERO, sample: None, accuracy_deg: USUAL_ACCURACY_DEG }
+    );
+    let target = run(&hub, start, 0, 50);
+    assert!(near(target, -0.5, 0.25), "{target:?}");
+    assert_eq!(hub.report(start).note, None, "nothing was lost");
+}
+
+#[test]
+fn a_sample_goes_through_the_view_at_its_own_time() {
+    let start = Instant::now() + Duration::from_millis(START_MS);
+    let (hub, path) = hub(0);
+    run(&hub, start, 0, 500);
+    // The view turns at once by 20 degrees; the samples that are there were taken before.
+    let turned = View::new(20_f32.to_radians(), 0.0, 1.0, 0.5);
+    hub.frame(start + Duration::from_millis(505), place(), turned, None);
+    let target = hub.target(start + Duration::from_millis(506), &turned);
+    let direction = view().direction_at(Vec2::new(0.5, 0.0));
+    assert!(target.point.distance(turned.point_of(direction).unwrap()) < 1e-3, "{target:?}");
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn drift_is_taken_off_and_accuracy_widens() {
+    let start = Instant::now() + Duration::from_millis(START_MS);
+    let (hub, path) = hub(0);
+    let true_deg = place().deg_from_picture([0.3, 0.1]);
+    let seen_deg = place().deg_from_screen([0.75, 0.5], None);
+    let drift = DriftCorrection { offset_deg: [seen_deg[0] - true_deg[0], seen_deg[1] - true_deg[1]] };
+    hub.set_profile(Profile { drift, accuracy_deg: Some(0.63), ..Profile::default() });
+    let target = run(&hub, start, 0, 500);
+    assert!(near(target, 0.3, 0.1), "{target:?}");
+    assert!((target.accuracy_deg - 0.6).abs() < 1e-9);
+    let raw = hub.take_raw(start + Duration::from_millis(500));
+    assert!(raw.len() >= 45 && raw.iter().all(|(_, deg)| (deg[0] - seen_deg[0]).abs() < 1e-9), "uncorrected");
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn sources_are_switched_while_running_and_a_wrong_one_changes_nothing() {
+    let start = Instant::now() + Duration::from_millis(START_MS);
+    let (hub, path) = hub(0);
+    run(&hub, start, 0, 500);
+    let missing = SourceSpec::Trace("no/such/trace.csv".into(), false);
+    assert!(hub.choose(&[missing], start).is_err());
+    assert_eq!(hub.specs().len(), 2);
+    hub.choose(&[SourceSpec::Mouse], start).unwrap();
+    let pointer = run(&hub, start, 510, 600);
+    assert!(near(pointer, -0.5, 0.25) && pointer.accuracy_deg == 0.0, "{pointer:?}");
+    hub.choose(&[SourceSpec::Trace(path.clone(), true)], start).unwrap();
+    assert!(near(run(&hub, start, 610, 1200), 0.5, 0.0));
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn the_pointer_is_recorded_as_fractions_of_the_screen() {
+    let start = Instant::now() + Duration::from_millis(START_MS);
+    let hub = GazeHub::new(&[], None).unwrap();
+    let path = std::env::temp_dir().join(format!("fovea-hub-record-{}.csv", std::process::id()));
+    let _ = std::fs::remove_file(&path);
+    run(&hub, start, 0, 50);
+    hub.record(&path).unwrap();
+    run(&hub, start, 60, 200);
+    assert_eq!(hub.report(start).recording, Some(15));
+    assert_eq!(hub.stop_recording().unwrap(), Some(15));
+    assert_eq!(hub.stop_recording().unwrap(), None);
+    let trace = crate::gaze::parse::trace::Trace::parse(&std::fs::read_to_string(&path).unwrap()).unwrap();
+    assert!(trace.rows.iter().all(|row| row.point == [0.25, 0.375] && row.valid), "{:?}", trace.rows[0]);
+    assert_eq!((trace.header.source.as_str(), trace.header.distance_mm), ("mouse", Some(600.0)));
+    std::fs::remove_file(path).unwrap();
+}

@@ -1,0 +1,199 @@
+//! What is remembered of a person before a screen: millimetres, distance, drift, accuracy. A JSON file of the user's.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use serde_json::{Value, json};
+
+use super::drift::DriftCorrection;
+use super::parse::edid::{self, MonitorSize};
+use crate::screen::ScreenGeometry;
+
+/// One person before one screen.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Profile {
+    /// Screen and distance, once somebody has said or accepted them.
+    pub screen: Option<ScreenGeometry>,
+    /// Taken off every sample.
+    pub drift: DriftCorrection,
+    /// What the last validation found, degrees.
+    pub accuracy_deg: Option<f64>,
+    /// What the last validation found, degrees.
+    pub precision_deg: Option<f64>,
+}
+
+impl Profile {
+    fn to_json(self) -> Value {
+        json!({
+            "screen_mm": self.screen.map(|screen| [screen.width_mm, screen.height_mm]),
+            "distance_mm": self.screen.map(|screen| screen.distance_mm),
+            "drift_deg": self.drift.offset_deg,
+            "accuracy_deg": self.accuracy_deg,
+            "precision_deg": self.precision_deg,
+        })
+    }
+
+    /// What of an entry makes sense; the rest is as if it were not there.
+    fn from_json(value: &Value) -> Self {
+        let number = |value: &Value, low: f64, high: f64| value.as_f64().filter(|found| (low..=high).contains(found));
+        let mm = |value: &Value| number(value, 10.0, 100_000.0).map(|found| found as f32);
+        let screen = || {
+            Some(ScreenGeometry {
+                width_mm: mm(&value["screen_mm"][0])?,
+                height_mm: mm(&value["screen_mm"][1])?,
+                distance_mm: mm(&value["distance_mm"])?,
+            })
+        };
+        let drift = |axis: usize| number(&value["drift_deg"][axis], -20.0, 20.0).unwrap_or(0.0);
+        Self {
+            screen: screen(),
+            drift: DriftCorrection { offset_deg: [drift(0), drift(1)] },
+            accuracy_deg: number(&value["accuracy_deg"], 0.0, 90.0),
+            precision_deg: number(&value["precision_deg"], 0.0, 90.0),
+        }
+    }
+}
+
+/// All that is remembered.
+#[derive(Clone, Debug, Default)]
+pub struct Profiles {
+    /// Where it is kept; nowhere when the system names no folder for settings.
+    path: Option<PathBuf>,
+    entries: BTreeMap<String, Profile>,
+}
+
+impl Profiles {
+    /// From the user's settings. A file that cannot be read counts as empty and is named in the note.
+    pub fn load() -> (Self, Option<String>) {
+        folder().map_or((Self::default(), None), |folder| Self::load_from(&folder.join("gaze.json")))
+    }
+
+    /// From a file.
+    pub fn load_from(path: &Path) -> (Self, Option<String>) {
+        let mut profiles = Self { path: Some(path.to_owned()), entries: BTreeMap::new() };
+        let text = match std::fs::read_to_string(path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return (profiles, None),
+            Err(error) => return (profiles, Some(format!("{}: {error}", path.display()))),
+        };
+        match serde_json::from_str::<BTreeMap<String, Value>>(&text) {
+            Ok(entries) => {
+                profiles.entries =
+                    entries.iter().map(|(key, value)| (key.clone(), Profile::from_json(value))).collect();
+                (profiles, None)
+            }
+            Err(error) => (profiles, Some(format!("{}: {error}; settings of gaze start afresh", path.display()))),
+        }
+    }
+
+    /// What is remembered of a person before a screen.
+    pub fn get(&self, person: &str, monitor: &str) -> Profile {
+        self.entries.get(&key(person, monitor)).copied().unwrap_or_default()
+    }
+
+    /// Remembers a person before a screen, and writes the file.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn set(&mut self, person: &str, monitor: &str, profile: Profile) -> anyhow::Result<()> {
+        self.entries.insert(key(person, monitor), profile);
+        let Some(path) = &self.path else { return Ok(()) };
+        let entries: BTreeMap<&String, Value> =
+            self.entries.iter().map(|(key, profile)| (key, profile.to_json())).collect();
+        let text = format!("{:#}\n", json!(entries));
+        if let Some(folder) = path.parent() {
+            std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        }
+        // Replaced in one step, so that an interrupted write leaves the old file.
+        let temporary = path.with_extension("json.new");
+        std::fs::write(&temporary, text).with_context(|| temporary.display().to_string())?;
+        std::fs::rename(&temporary, path).with_context(|| path.display().to_string())
+    }
+}
+
+fn key(person: &str, monitor: &str) -> String {
+    format!("{person} @ {monitor}")
+}
+
+/// The folder for this program's settings.
+fn folder() -> Option<PathBuf> {
+    let variable = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    let base = if cfg!(windows) {
+        variable("APPDATA")
+    } else if cfg!(target_os = "macos") {
+        variable("HOME").map(|home| home.join("Library/Application Support"))
+    } else {
+        variable("XDG_CONFIG_HOME").or_else(|| variable("HOME").map(|home| home.join(".config")))
+    };
+    base.map(|base| base.join("fovea"))
+}
+
+/// The size of the monitor with so many pixels, as the monitor states it. Linux offers that in `/sys/class/drm`; `None`
+/// elsewhere, and when monitors of that many pixels differ in size.
+pub fn monitor_mm(size_px: [u32; 2]) -> Option<[f32; 2]> {
+    let entries = std::fs::read_dir("/sys/class/drm").ok()?;
+    let files = entries.filter_map(|entry| std::fs::read(entry.ok()?.path().join("edid")).ok());
+    agreed_mm(files.filter_map(|bytes| edid::monitor_size(&bytes)), size_px)
+}
+
+/// The millimetres that all monitors of so many pixels have, either way up.
+fn agreed_mm(monitors: impl Iterator<Item = MonitorSize>, size_px: [u32; 2]) -> Option<[f32; 2]> {
+    let turned = |[a, b]: [f32; 2]| [b, a];
+    let mut fitting = monitors.filter_map(|monitor| match monitor.size_px {
+        size if size == size_px => Some(monitor.size_mm),
+        [height, width] if [width, height] == size_px => Some(turned(monitor.size_mm)),
+        _ => None,
+    });
+    let first = fitting.next()?;
+    let alike = |mm: [f32; 2]| (0..2).all(|axis| (mm[axis] - first[axis]).abs() <= 10.0);
+    fitting.all(alike).then_some(first)
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn profiles_are_kept_per_person_and_screen_and_broken_files_do_no_harm() {
+        let folder = std::env::temp_dir().join(format!("fovea-profile-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&folder);
+        let path = folder.join("gaze.json");
+        let (mut profiles, note) = Profiles::load_from(&path);
+        assert_eq!((profiles.get("a", "left"), note), (Profile::default(), None));
+        let profile = Profile {
+            screen: Some(ScreenGeometry { width_mm: 600.0, height_mm: 340.0, distance_mm: 700.0 }),
+            drift: DriftCorrection { offset_deg: [0.5, -1.25] },
+            accuracy_deg: Some(0.75),
+            precision_deg: Some(0.125),
+        };
+        profiles.set("a", "left", profile).unwrap();
+        let (again, note) = Profiles::load_from(&path);
+        assert_eq!(note, None);
+        assert_eq!((again.get("a", "left"), again.get("b", "left")), (profile, Profile::default()));
+        assert_eq!(again.get("a", "right"), Profile::default());
+
+        let odd = r#"{ "a @ left": { "screen_mm": [-1, 2], "distance_mm": "far", "drift_deg": [90, 1], "accuracy_deg": null } }"#;
+        std::fs::write(&path, odd).unwrap();
+        let (partly, _) = Profiles::load_from(&path);
+        let kept = Profile { drift: DriftCorrection { offset_deg: [0.0, 1.0] }, ..Profile::default() };
+        assert_eq!(partly.get("a", "left"), kept);
+        std::fs::write(&path, "{").unwrap();
+        let (empty, note) = Profiles::load_from(&path);
+        assert_eq!(empty.get("a", "left"), Profile::default());
+        assert!(note.unwrap().contains("gaze.json"));
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn monitors_are_told_apart_by_their_pixels() {
+        let monitor = |width, height, mm| MonitorSize { size_px: [width, height], size_mm: mm };
+        let desk = [monitor(1920, 1080, [531.0, 299.0]), monitor(2560, 1440, [597.0, 336.0])];
+        assert_eq!(agreed_mm(desk.into_iter(), [2560, 1440]), Some([597.0, 336.0]));
+        assert_eq!(agreed_mm(desk.into_iter(), [1080, 1920]), Some([299.0, 531.0]));
+        assert_eq!(agreed_mm(desk.into_iter(), [800, 600]), None);
+        let twins = [desk[0], monitor(1920, 1080, [344.0, 194.0])];
+        assert_eq!(agreed_mm(twins.into_iter(), [1920, 1080]), None, "a laptop beside a monitor");
+    }
+}

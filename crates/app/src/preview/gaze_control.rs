@@ -1,0 +1,363 @@
+//! What the window does about gaze: the screen it is on, who sits before it, dots to look at, recording.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use egui::{Context, Rect};
+use serde_json::{Value, json};
+
+use super::controls::Controls;
+use super::gaze::Desktop;
+use crate::cli::PreviewArgs;
+use crate::gaze::geometry::WindowPlace;
+use crate::gaze::hub::{GazeHub, HubReport, Target};
+use crate::gaze::profile::{self, Profile, Profiles};
+use crate::gaze::source::Calibration;
+use crate::gaze::spec::SourceSpec;
+use crate::gaze::validation::{DotRun, Outcome, Purpose};
+use crate::output::free_name;
+use crate::screen::ScreenGeometry;
+use crate::view::View;
+
+/// How often the window's place on the desktop is asked for.
+const LOOK: Duration = Duration::from_millis(500);
+/// How long a note stays.
+const NOTE: Duration = Duration::from_secs(5);
+/// How often the window is drawn for a tracker's gaze; tracing goes by every sample all the same.
+const FOLLOW: Duration = Duration::from_millis(50);
+/// Changed millimetres are kept after they have rested so long.
+const RESTED: Duration = Duration::from_secs(2);
+
+/// Where the screen's millimetres come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ScreenKnown {
+    /// The command line.
+    Asked,
+    /// What was set before, for this screen and person.
+    Remembered,
+    /// The monitor's own data; the distance is a guess.
+    Monitor,
+    /// Nobody has said.
+    Guessed,
+}
+
+/// Gaze as the window has it.
+pub struct GazeControl {
+    hub: Arc<GazeHub>,
+    /// What can be chosen, in the panel's order.
+    pub choices: Vec<SourceSpec>,
+    /// The chosen one.
+    pub chosen: SourceSpec,
+    profiles: Profiles,
+    person: String,
+    profile: Profile,
+    desktop: Option<Desktop>,
+    looked: Option<Instant>,
+    /// Where the screen's millimetres come from.
+    pub screen_known: ScreenKnown,
+    /// The screen as it is kept or was found, and since when it differs from what the panel has.
+    kept_screen: Option<ScreenGeometry>,
+    changed: Option<(ScreenGeometry, Instant)>,
+    place: WindowPlace,
+    dots: Option<DotRun>,
+    /// What the last dots told, one line.
+    pub outcome: Option<String>,
+    /// Whether the person has agreed to be recorded.
+    pub consents: bool,
+    recording: Option<PathBuf>,
+    note: Option<(String, Instant)>,
+}
+
+impl GazeControl {
+    /// For a hub whose sources the command line named.
+    pub fn new(hub: Arc<GazeHub>, args: &PreviewArgs) -> Self {
+        let (profiles, trouble) = Profiles::load();
+        let named = args.gaze.sources.first().cloned().unwrap_or(SourceSpec::Mouse);
+        let usual = [SourceSpec::Mouse, SourceSpec::MouseDwell].into_iter().chain(SourceSpec::usual_trackers());
+        let mut choices = args.gaze.sources.clone();
+        usual.for_each(|spec| {
+            if !choices.contains(&spec) {
+                choices.push(spec);
+            }
+        });
+        let asked = args.sampling.screen_mm.is_some();
+        Self {
+            hub,
+            choices,
+            chosen: named,
+            profiles,
+            person: args.gaze.person.clone(),
+            profile: Profile::default(),
+            desktop: None,
+            looked: None,
+            screen_known: if asked { ScreenKnown::Asked } else { ScreenKnown::Guessed },
+            kept_screen: None,
+            changed: None,
+            place: WindowPlace::default(),
+            dots: None,
+            outcome: None,
+            consents: false,
+            recording: None,
+            note: trouble.map(|text| (text, Instant::now())),
+        }
+    }
+
+    /// Whether the panel is open from the start: when a tracker was asked for.
+    pub fn is_worth_showing(&self) -> bool {
+        !self.chosen.is_mouse()
+    }
+
+    /// Keeps up with the screen that the window is on; a new screen brings its millimetres and the person's drift.
+    pub fn follow_screen(&mut self, frame: &eframe::Frame, controls: &mut Controls, now: Instant) {
+        if self.looked.is_some_and(|at| now.saturating_duration_since(at) < LOOK) {
+            return;
+        }
+        self.looked = Some(now);
+        let Some(desktop) = Desktop::of(frame) else { return };
+        let known = self.desktop.as_ref().is_some_and(|last| last.monitor_name == desktop.monitor_name);
+        if !known {
+            self.profile = self.profiles.get(&self.person, &desktop.monitor_name);
+            self.hub.set_profile(self.profile);
+            if self.screen_known != ScreenKnown::Asked {
+                let size_px = desktop.monitor.size.map(|side| side as u32);
+                (controls.screen, self.screen_known) =
+                    screen(&self.profile, profile::monitor_mm(size_px), controls.screen);
+            }
+            self.kept_screen = Some(controls.screen);
+        }
+        self.desktop = Some(desktop);
+    }
+
+    /// Keeps millimetres that the person has set.
+    pub fn remember_screen(&mut self, controls: &Controls, now: Instant) {
+        if self.kept_screen.is_none_or(|kept| kept == controls.screen) {
+            self.changed = None;
+            return;
+        }
+        match self.changed {
+            Some((screen, since)) if screen == controls.screen => {
+                if now.saturating_duration_since(since) >= RESTED {
+                    self.accept_screen(controls.screen, now);
+                }
+            }
+            _ => self.changed = Some((controls.screen, now)),
+        }
+    }
+
+    fn accept_screen(&mut self, screen: ScreenGeometry, now: Instant) {
+        self.kept_screen = Some(screen);
+        self.changed = None;
+        self.screen_known = ScreenKnown::Remembered;
+        self.keep(Profile { screen: Some(screen), ..self.profile }, now);
+    }
+
+    /// Says that the millimetres shown are right, so that they are not asked for again.
+    pub fn confirm_screen(&mut self, now: Instant) {
+        if let Some(screen) = self.kept_screen {
+            self.accept_screen(screen, now);
+        }
+    }
+
+    fn keep(&mut self, profile: Profile, now: Instant) {
+        self.profile = profile;
+        self.hub.set_profile(profile);
+        let Some(desktop) = &self.desktop else { return };
+        if let Err(error) = self.profiles.set(&self.person, &desktop.monitor_name, profile) {
+            self.note = Some((format!("not kept: {error:#}"), now));
+        }
+    }
+
+    /// Where the picture is.
+    pub fn place(&self, ctx: &Context, rect: Rect, screen: ScreenGeometry) -> WindowPlace {
+        match &self.desktop {
+            Some(desktop) => desktop.place(rect, ctx.pixels_per_point(), screen),
+            None => WindowPlace { screen, ..WindowPlace::default() },
+        }
+    }
+
+    /// One frame of the window: tells the hub what is shown, and goes on with the dots. Where somebody looks.
+    pub fn frame(&mut self, now: Instant, place: WindowPlace, view: View, pointer: Option<[f64; 2]>) -> Target {
+        self.place = place;
+        self.hub.frame(now, place, view, pointer);
+        if let Some(mut dots) = self.dots.take() {
+            let target_deg = place.deg_from_picture(dots.dot());
+            let validates = dots.purpose == Purpose::Validation;
+            let corrected = |deg| if validates { self.profile.drift.apply(deg) } else { deg };
+            let seen: Vec<_> = self.hub.take_raw(now).into_iter().map(|(at, deg)| (at, corrected(deg))).collect();
+            match dots.update(now, target_deg, &seen) {
+                Some(outcome) => self.conclude(&outcome, now),
+                None => self.dots = Some(dots),
+            }
+        }
+        self.hub.target(now, &view)
+    }
+
+    fn conclude(&mut self, outcome: &Outcome, now: Instant) {
+        let text = match outcome {
+            Outcome::Drift(Ok(drift)) => {
+                self.keep(Profile { drift: *drift, ..self.profile }, now);
+                format!("drift of {:.2}, {:.2} degrees is taken off", drift.offset_deg[0], drift.offset_deg[1])
+            }
+            Outcome::Drift(Err(refused)) => format!("no correction: {refused}"),
+            Outcome::Validation(result) if result.dots == 0 => "no valid gaze at any dot".into(),
+            Outcome::Validation(result) => {
+                let (accuracy_deg, precision_deg) = (Some(result.accuracy_deg), Some(result.precision_deg));
+                self.keep(Profile { accuracy_deg, precision_deg, ..self.profile }, now);
+                format!(
+                    "accuracy {:.2} degrees (worst {:.2}), precision {:.2}, {} of 9 dots",
+                    result.accuracy_deg, result.worst_deg, result.precision_deg, result.dots
+                )
+            }
+        };
+        self.outcome = Some(text);
+    }
+
+    /// Shows dots to look at.
+    pub fn start_dots(&mut self, purpose: Purpose, now: Instant) {
+        // What was looked at before does not count.
+        self.hub.take_raw(now);
+        self.dots = Some(DotRun::start(purpose, now));
+    }
+
+    /// Takes the dots away.
+    pub fn stop_dots(&mut self) {
+        self.dots = None;
+    }
+
+    /// Whether dots are shown.
+    pub fn shows_dots(&self) -> bool {
+        self.dots.is_some()
+    }
+
+    /// The dots that are shown.
+    pub fn dots(&self) -> Option<&DotRun> {
+        self.dots.as_ref()
+    }
+
+    /// Takes the correction back.
+    pub fn forget_drift(&mut self, now: Instant) {
+        self.keep(Profile { drift: crate::gaze::drift::DriftCorrection::default(), ..self.profile }, now);
+    }
+
+    /// What is known of the person before this screen.
+    pub fn profile(&self) -> &Profile {
+        &self.profile
+    }
+
+    /// Whether the window's place on the desktop is known.
+    pub fn position_known(&self) -> bool {
+        self.place.position_known
+    }
+
+    /// Uses a source from now on.
+    pub fn choose(&mut self, spec: SourceSpec, now: Instant) {
+        match self.hub.choose(std::slice::from_ref(&spec), now) {
+            Ok(()) => self.chosen = spec,
+            Err(error) => self.note = Some((format!("{error:#}"), now)),
+        }
+    }
+
+    /// Asks a tracker to calibrate itself.
+    pub fn calibrate(&mut self, index: usize, now: Instant) {
+        if !self.hub.calibrate(index) {
+            self.note = Some(("calibrate this tracker with its own program".into(), now));
+        }
+    }
+
+    /// Begins or ends a recording, into a new file of the working directory.
+    pub fn toggle_recording(&mut self, now: Instant) {
+        let text = match self.recording.take() {
+            Some(path) => match self.hub.stop_recording() {
+                Ok(Some(rows)) => format!("{rows} rows in {}", path.display()),
+                Ok(None) => "the recording had ended before".into(),
+                Err(error) => format!("{error:#}"),
+            },
+            None if !self.consents => "a recording needs the consent of whoever looks".into(),
+            None => {
+                let path = free_name(Path::new(""), "gaze", "csv");
+                match self.hub.record(&path) {
+                    Ok(()) => {
+                        let text = format!("recording gaze to {}", path.display());
+                        self.recording = Some(path);
+                        text
+                    }
+                    Err(error) => format!("{error:#}"),
+                }
+            }
+        };
+        self.note = Some((text, now));
+    }
+
+    /// What the hub has to tell.
+    pub fn report(&self, now: Instant) -> HubReport {
+        self.hub.report(now)
+    }
+
+    /// The newest note, while it is new.
+    pub fn note(&self, now: Instant) -> Option<String> {
+        let notes = [self.note.clone(), self.hub.report(now).note];
+        let newest = notes.into_iter().flatten().max_by_key(|(_, at)| *at);
+        newest.filter(|(_, at)| now.saturating_duration_since(*at) < NOTE).map(|(text, _)| text)
+    }
+
+    /// Whether the window is to be drawn again soon for the gaze alone.
+    pub fn wants_frames(&self) -> bool {
+        self.shows_dots() || !self.chosen.is_mouse() || self.chosen == SourceSpec::MouseDwell
+    }
+
+    /// How soon.
+    pub fn frame_interval(&self) -> Duration {
+        if self.shows_dots() { Duration::from_millis(16) } else { FOLLOW }
+    }
+
+    /// Figures for a screenshot's report.
+    pub fn figures(&self, now: Instant) -> Value {
+        let report = self.hub.report(now);
+        let ms = |duration: Duration| duration.as_secs_f64() * 1e3;
+        let sources = report.sources.iter().map(|source| {
+            json!({
+                "source": source.name,
+                "state": source.status.state.to_string(),
+                "active": source.active,
+                "received": source.status.received,
+                "dropped": source.status.dropped,
+                "calibrated": matches!(source.status.calibration, Calibration::Done(_)),
+            })
+        });
+        json!({
+            "sources": sources.collect::<Vec<_>>(),
+            "arrival_to_batch_ms": report.timing.arrival_to_batch.map(|(median, _)| ms(median)),
+            "longest_arrival_to_batch_ms": report.timing.arrival_to_batch.map(|(_, longest)| ms(longest)),
+            "longest_batch_interval_ms": report.timing.longest_frame.map(ms),
+            "age_ms": report.timing.age.map(ms),
+            "recorded_rows": report.recording,
+            "position_known": self.place.position_known,
+        })
+    }
+}
+
+/// Millimetres and distance: what was kept, else what the monitor says, else what is set already.
+fn screen(profile: &Profile, monitor_mm: Option<[f32; 2]>, set: ScreenGeometry) -> (ScreenGeometry, ScreenKnown) {
+    match (profile.screen, monitor_mm) {
+        (Some(screen), _) => (screen, ScreenKnown::Remembered),
+        (None, Some([width_mm, height_mm])) => (ScreenGeometry { width_mm, height_mm, ..set }, ScreenKnown::Monitor),
+        (None, None) => (set, ScreenKnown::Guessed),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_set_goes_before_what_the_monitor_says() {
+        let set = ScreenGeometry::default();
+        let kept = ScreenGeometry { width_mm: 600.0, height_mm: 340.0, distance_mm: 800.0 };
+        let profile = Profile { screen: Some(kept), ..Profile::default() };
+        assert_eq!(screen(&profile, Some([1.0, 2.0]), set), (kept, ScreenKnown::Remembered));
+        let (found, known) = screen(&Profile::default(), Some([344.0, 194.0]), set);
+        assert_eq!((found.width_mm, found.distance_mm, known), (344.0, set.distance_mm, ScreenKnown::Monitor));
+        assert_eq!(screen(&Profile::default(), None, set), (set, ScreenKnown::Guessed));
+    }
+}
