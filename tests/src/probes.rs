@@ -85,8 +85,8 @@ pub enum Expectation {
     Same(Vec3, f32),
     /// Another place's luminance is at least this many times as high.
     Darker(Vec3, f32),
-    /// One channel (0 red, 1 green, 2 blue) is at least twice each of the others.
-    Hue(usize),
+    /// One channel (0 red, 1 green, 2 blue) is at least this many times each of the others.
+    Hue(usize, f32),
 }
 
 impl Expectation {
@@ -94,7 +94,7 @@ impl Expectation {
     pub fn other(&self) -> Option<Vec3> {
         match *self {
             Self::Same(place, _) | Self::Darker(place, _) => Some(place),
-            Self::Color(..) | Self::Hue(_) => None,
+            Self::Color(..) | Self::Hue(..) => None,
         }
     }
 
@@ -105,7 +105,7 @@ impl Expectation {
             Self::Color(color, within) => (value - color).abs().max_element() <= within,
             Self::Same(_, within) => (value - other).abs().max_element() <= within,
             Self::Darker(_, times) => luminance(other) >= times * luminance(value) && luminance(other) > 1e-3,
-            Self::Hue(channel) => (0..3).all(|c| c == channel || value[channel] >= 2.0 * value[c] + 1e-3),
+            Self::Hue(channel, times) => (0..3).all(|c| c == channel || value[channel] >= times * value[c] + 1e-3),
         }
     }
 }
@@ -133,7 +133,8 @@ fn probe(value: &Value) -> Option<Probe> {
         Expectation::Darker(place, number(&value["times"])?)
     } else {
         let hue = value["hue"].as_str()?;
-        Expectation::Hue(["red", "green", "blue"].iter().position(|name| *name == hue)?)
+        let channel = ["red", "green", "blue"].iter().position(|name| *name == hue)?;
+        Expectation::Hue(channel, number(&value["times"]).unwrap_or(2.0))
     };
     let radius_px = value["radius_px"].as_u64().unwrap_or(1) as u32;
     Some(Probe { why: text(&value["why"])?, at: vector(&value["at"])?, radius_px, expect })
