@@ -22,7 +22,8 @@ use tracer::{
 const SAMPLES: u32 = 1 << 17;
 /// Standard errors above this would prove little.
 const LARGEST_ERROR: f64 = 6e-3;
-const ROUGHNESS: [f32; 6] = [0.0, 1e-4, 0.1, 0.3, 0.6, 1.0];
+/// The last two lie between entries of the albedo tables.
+const ROUGHNESS: [f32; 8] = [0.0, 1e-4, 0.1, 0.3, 0.6, 1.0, 0.12, 0.45];
 const COSINES: [f32; 5] = [1.0, 0.7, 0.3, 0.1, 0.02];
 /// Rounding of weights in f32.
 const ROUNDING: f64 = 2e-5;
@@ -258,7 +259,7 @@ asserts that nothing is above 1 + 3 standard errors, and that all but the anisot
 
 Lobes that compensate for multiple scattering among microfacets: reflection off metals and dielectrics, thin transmission, rough
 glass from both sides, clearcoat. Sheen and the layers below every lobe are scaled by directional albedos. The albedo tables are
-raised by 0.1 % so that interpolation never gains energy: 0.999 below is that margin.
+raised by 0.25 % so that interpolation never gains energy: 0.997 below is that margin.
 
 - Anisotropy: the compensation fades out until one roughness is 4/3 of the other; beyond it a white metal loses what a single
   bounce loses.

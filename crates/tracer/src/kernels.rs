@@ -32,8 +32,8 @@ pub const TEXEL_PAGE_BITS: u32 = 11;
 pub const SOBOL_DIMENSIONS: u32 = 10;
 /// Entries of the tables of rough lobes' albedos along the angle.
 pub const ALBEDO_COLUMNS: u32 = 64;
-/// Entries along the roughness; the least roughness of sheen, 0.1, is one of them.
-pub const ALBEDO_ROWS: u32 = 31;
+/// Entries along the roughness.
+pub const ALBEDO_ROWS: u32 = 61;
 /// Entries of the tables of rough glass along angle and roughness.
 pub const GLASS_SIZE: u32 = 20;
 /// Entries along the index.

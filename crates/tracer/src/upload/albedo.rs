@@ -30,14 +30,14 @@ const FINE: Lattice = Lattice(987, 610);
 /// Errors up to 4e-4.
 const COARSE: Lattice = Lattice(610, 377);
 /// Entries are raised by this fraction: what they divide then never gains energy through interpolation and quadrature.
-const SAFETY: f64 = 1e-3;
+const SAFETY: f64 = 2.5e-3;
 /// Likewise for the coarser table of glass.
 const GLASS_SAFETY: f64 = 2e-3;
 /// Likewise for sheen, which bends sharply where it is smooth and grazing.
-const SHEEN_SAFETY: f64 = 6e-3;
+const SHEEN_SAFETY: f64 = 4e-3;
 /// Smallest cosine that a table has an entry for: the shaders' outgoing directions are no flatter.
 const LEAST_COSINE: f64 = 1e-4;
-/// Square of `LEAST_SHEEN_ROUGHNESS` of `shaders/shading/layers.wesl`.
+/// Square of `LEAST_SHEEN_ROUGHNESS` of `shaders/shading/sheen.wesl`.
 const LEAST_SHEEN_ALPHA: f64 = 0.01;
 
 /// Width and texels of the table that the features need; one texel when they need none.
@@ -101,13 +101,15 @@ fn reflection_table() -> &'static [[f32; 2]] {
     })
 }
 
-/// White sheen, in the order of [`reflection_table`]; the second number is unused.
+/// White sheen: rows of the fourth root of alpha from the least one to 1, columns of cosine; the second number is unused.
 fn sheen_table() -> &'static [[f32; 2]] {
     static TABLE: OnceLock<Vec<[f32; 2]>> = OnceLock::new();
     TABLE.get_or_init(|| {
         let entry = |i: u32| {
             let cosine = node(i % ALBEDO_COLUMNS, ALBEDO_COLUMNS).max(LEAST_COSINE);
-            let alpha = node(i / ALBEDO_COLUMNS, ALBEDO_ROWS).max(LEAST_SHEEN_ALPHA);
+            let share = f64::from(i / ALBEDO_COLUMNS) / f64::from(ALBEDO_ROWS - 1);
+            let least = LEAST_SHEEN_ALPHA.powf(0.25);
+            let alpha = (least + share * (1.0 - least)).powi(4);
             [raised(charlie_albedo(cosine, alpha, FINE), SHEEN_SAFETY), 0.0]
         };
         (0..ALBEDO_COLUMNS * ALBEDO_ROWS).into_par_iter().map(entry).collect()
@@ -268,18 +270,15 @@ mod tests {
 
     const FINEST: Lattice = Lattice(4181, 2584);
 
-    /// As the shader interpolates.
-    fn looked_up(cosine: f64, alpha: f64) -> [f64; 3] {
-        let place = |x: f64, count: u32| {
-            let p = x.sqrt() * f64::from(count - 1);
+    /// As the shader interpolates; `row` in 0..=1.
+    fn looked_up(table: &[[f32; 2]], cosine: f64, row: f64) -> [f64; 2] {
+        let place = |share: f64, count: u32| {
+            let p = share * f64::from(count - 1);
             let cell = (p as u32).min(count - 2);
             (cell, p - f64::from(cell))
         };
-        let ((x, fx), (y, fy)) = (place(cosine, ALBEDO_COLUMNS), place(alpha, ALBEDO_ROWS));
-        let at = |x: u32, y: u32, k: usize| {
-            let i = (y * ALBEDO_COLUMNS + x) as usize;
-            f64::from(if k == 2 { sheen_table()[i][0] } else { reflection_table()[i][k] })
-        };
+        let ((x, fx), (y, fy)) = (place(cosine.sqrt(), ALBEDO_COLUMNS), place(row, ALBEDO_ROWS));
+        let at = |x: u32, y: u32, k: usize| f64::from(table[(y * ALBEDO_COLUMNS + x) as usize][k]);
         std::array::from_fn(|k| {
             let low = at(x, y, k) * (1.0 - fx) + at(x + 1, y, k) * fx;
             let high = at(x, y + 1, k) * (1.0 - fx) + at(x + 1, y + 1, k) * fx;
@@ -334,7 +333,7 @@ mod tests {
                 let cosine = ((f64::from(i) + 0.37) / 40.0).powi(2);
                 let roughness = 0.04 + 0.96 * (f64::from(j) + 0.61) / 40.0;
                 let alpha = roughness * roughness;
-                let [near, grazing, sheen] = looked_up(cosine, alpha);
+                let [near, grazing] = looked_up(reflection_table(), cosine, roughness);
                 let [true_near, true_grazing] = ggx_albedos(cosine, alpha, FINEST);
                 let white = (near + grazing) / (true_near + true_grazing) - 1.0;
                 if cosine > 0.01 {
@@ -342,7 +341,9 @@ mod tests {
                 }
                 if alpha >= LEAST_SHEEN_ALPHA && cosine > 0.01 {
                     let truth = charlie_albedo(cosine, alpha, FINEST);
-                    assert!(sheen > truth && sheen < 1.015 * truth + 1e-4, "sheen {cosine} {alpha}: {sheen} {truth}");
+                    let least = LEAST_SHEEN_ALPHA.powf(0.25);
+                    let [sheen, _] = looked_up(sheen_table(), cosine, (roughness.sqrt() - least) / (1.0 - least));
+                    assert!(sheen > truth && sheen < 1.015 * truth + 1e-3, "sheen {cosine} {alpha}: {sheen} {truth}");
                 }
             }
         }
