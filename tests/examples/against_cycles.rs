@@ -33,13 +33,12 @@ fn folder(variable: &str) -> Result<PathBuf, String> {
 fn write_map(file: &Path, maps: &[Vec<Option<Block>>], columns: u32) -> image::ImageResult<()> {
     let rows = maps.first().map_or(0, Vec::len) as u32 / columns;
     let all: Vec<&Option<Block>> = maps.iter().flatten().collect();
-    let picture =
-        RgbImage::from_fn(columns * MAP_BLOCK_PX, rows * maps.len() as u32 * MAP_BLOCK_PX, |x, y| {
-            let Some(block) = all[(y / MAP_BLOCK_PX * columns + x / MAP_BLOCK_PX) as usize] else { return Rgb([128; 3]) };
-            let strength = (block.relative() / FULL_COLOR).clamp(-1.0, 1.0);
-            let faded = (255.0 * (1.0 - strength.abs())).round() as u8;
-            if strength > 0.0 { Rgb([255, faded, faded]) } else { Rgb([faded, faded, 255]) }
-        });
+    let picture = RgbImage::from_fn(columns * MAP_BLOCK_PX, rows * maps.len() as u32 * MAP_BLOCK_PX, |x, y| {
+        let Some(block) = all[(y / MAP_BLOCK_PX * columns + x / MAP_BLOCK_PX) as usize] else { return Rgb([128; 3]) };
+        let strength = (block.relative() / FULL_COLOR).clamp(-1.0, 1.0);
+        let faded = (255.0 * (1.0 - strength.abs())).round() as u8;
+        if strength > 0.0 { Rgb([255, faded, faded]) } else { Rgb([faded, faded, 255]) }
+    });
     picture.save(file)
 }
 
@@ -48,9 +47,8 @@ fn line(blocks: &[Option<Block>]) -> String {
     if found.is_empty() {
         return "0 | | | | ".into();
     }
-    let share = |errors: f64| {
-        100.0 * found.iter().filter(|b| b.is_within(0.05, errors)).count() as f64 / found.len() as f64
-    };
+    let share =
+        |errors: f64| 100.0 * found.iter().filter(|b| b.is_within(0.05, errors)).count() as f64 / found.len() as f64;
     let sum = |value: fn(&Block) -> f64| found.iter().map(|b| value(b)).sum::<f64>();
     let errors: Vec<f64> = found.iter().map(|b| 100.0 * b.error / b.theirs).collect();
     format!(

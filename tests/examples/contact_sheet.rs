@@ -36,8 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let columns = COLUMNS.min(models.len().max(1));
     let (width, height) = (columns * side as usize, models.len().div_ceil(columns) * side as usize);
     let mut sheet = vec![255u8; width * height * 3];
-    let options =
-        RendererOptions { film: probes::film(side), max_bounces: probes::MAX_BOUNCES, ..Default::default() };
+    let options = RendererOptions { film: probes::film(side), max_bounces: probes::MAX_BOUNCES, ..Default::default() };
     let mut renderer = Renderer::new(&device::gpu(), &options, Distribution::omnidirectional(device::inverse()))?;
     for (tile, model) in models.iter().enumerate() {
         let scene = model.load(&folder)?;
@@ -49,7 +48,12 @@ fn main() -> Result<(), Box<dyn Error>> {
             let y = tile / columns * side as usize + i / side as usize;
             sheet[(y * width + x) * 3..][..3].copy_from_slice(&pixel.mean.map(encoded));
         }
-        eprintln!("{}: mean {:.3}", model.file, film.pixels().map(|p| Vec3::from_array(p.mean.map(|v| v as f32))).sum::<Vec3>() / options.film.pixels() as f32);
+        eprintln!(
+            "{}: mean {:.3}",
+            model.file,
+            film.pixels().map(|p| Vec3::from_array(p.mean.map(|v| v as f32))).sum::<Vec3>()
+                / options.film.pixels() as f32
+        );
     }
     let encoder = JpegEncoder::new_with_quality(std::fs::File::create(out)?, JPEG_QUALITY);
     encoder.write_image(&sheet, width as u32, height as u32, ExtendedColorType::Rgb8)?;
