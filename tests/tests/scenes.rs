@@ -14,7 +14,7 @@ use tracer::{
     film::FilmOptions,
     gpu::Gpu,
     renderer::{FilmPose, Renderer, RendererOptions, SamplingTechnique},
-    scene::{Material, PunctualKind, PunctualLight, Scene},
+    scene::{Material, PunctualKind, PunctualLight, Scene, TexelEncoding},
 };
 
 const SAMPLES: u64 = 1 << 17;
@@ -292,6 +292,34 @@ fn light_samples_are_split_by_what_reaches_the_scene() {
     // The lamp's back, which does not emit, hides as much sky as it lights.
     let expected = 0.7 * (0.3 * factor + 1.0 - factor);
     assert_is("a lamp under a sky", measure(&gpu, &open, [Vec3::new(6.0, 1.0, 0.0), Vec3::ZERO], 1), expected);
+}
+
+/// A fine chequered pattern: from far its mean, whatever the phase, and from near the texel's own value.
+#[test]
+fn textures_do_not_alias_and_are_not_blurred() {
+    let gpu = device::gpu();
+    let mut builder = Builder::new(Vec3::ZERO);
+    let texels = [0u8, 255, 255, 0].map(|level| [level, level, level, 255]);
+    let mut pattern = builder.texture(2, TexelEncoding::Linear, texels.to_vec());
+    // Squares of 4 / 8192 metres.
+    pattern.texture_from_uv = [[4096.0, 0.0, 0.0], [0.0, 4096.0, 0.0]];
+    let glow = builder.material(Material { emissive_texture: Some(pattern), ..emitter(Vec3::ONE) });
+    builder.quad(Vec3::new(-2.0, -2.0, 0.0), Vec3::X * 4.0, Vec3::Y * 4.0, glow);
+    let scene = builder.build();
+    for shift in [0.0, 1e-4, 2.5e-4] {
+        // The pixel of 1e-4 radians is 1 m wide there: thousands of squares.
+        let target = Vec3::new(shift, 0.1, 0.0);
+        let far = measure(&gpu, &scene, [target + Vec3::new(0.0, 0.0, 1e4), target], 0);
+        assert_is("a pattern from afar", far, 0.5);
+    }
+    let square = 4.0 / 8192.0;
+    let values = [0.5f32, 1.5].map(|squares| {
+        let target = Vec3::new(squares * square, 0.5 * square, 0.0);
+        measure(&gpu, &scene, [target + Vec3::new(0.0, 0.0, 0.1), target], 0)
+    });
+    eprintln!("neighbouring squares from near: {values:?}");
+    assert!(values.iter().all(|value| value.1 == 0.0), "no texel bleeds into its neighbour");
+    assert!((values[0].0 - values[1].0).abs() > 1.0 - ROUNDING, "black and white stay so");
 }
 
 /// A clear sheet of half grey between lamps and floor halves their light, by every way of sampling; a sun shines through it.
