@@ -26,7 +26,8 @@ impl Display {
     fn start() -> Option<Self> {
         Command::new("xdotool").arg("version").output().ok()?;
         let mut server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "1280x720x24", "-nolisten", "tcp"])
+            // Without -noreset the server starts anew whenever the last client leaves, and refuses clients meanwhile.
+            .args(["-displayfd", "1", "-screen", "0", "1280x720x24", "-nolisten", "tcp", "-noreset"])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
