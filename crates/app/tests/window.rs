@@ -6,10 +6,14 @@
 
 use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use image::RgbImage;
 use serde_json::Value;
+
+/// Two windows on one CPU adapter would measure each other.
+static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
 /// An X server without a screen; stopped when dropped.
 struct Display {
@@ -22,7 +26,8 @@ impl Display {
     fn start() -> Option<Self> {
         Command::new("xdotool").arg("version").output().ok()?;
         let mut server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "1280x720x24", "-nolisten", "tcp"])
+            // Without -noreset the server starts anew whenever the last client leaves, and refuses clients meanwhile.
+            .args(["-displayfd", "1", "-screen", "0", "1280x720x24", "-nolisten", "tcp", "-noreset"])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
@@ -97,6 +102,7 @@ fn brightness(picture: &RgbImage, x: u32, y: u32) -> f64 {
 
 #[test]
 fn the_fovea_follows_the_pointer_and_most_of_the_time_goes_into_tracing() {
+    let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let Some(display) = Display::start() else {
         eprintln!(
             "SKIP the_fovea_follows_the_pointer_and_most_of_the_time_goes_into_tracing: Xvfb or xdotool is missing"
@@ -126,6 +132,7 @@ fn the_fovea_follows_the_pointer_and_most_of_the_time_goes_into_tracing() {
 
 #[test]
 fn a_trackers_gaze_reaches_the_next_batch_wherever_the_pointer_is() {
+    let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let Some(display) = Display::start() else {
         eprintln!("SKIP a_trackers_gaze_reaches_the_next_batch_wherever_the_pointer_is: Xvfb or xdotool is missing");
         return;

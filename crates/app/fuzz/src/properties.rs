@@ -5,7 +5,7 @@ use super::parse::lsl_info::{self, ChannelFormat, ClockReply, StreamInfo};
 use super::parse::opengaze::{CalibrationSummary, MAX_TAG, Splitter, Tag};
 use super::parse::pupil::{MAX_POINTS, SurfaceMessage};
 use super::parse::trace::Trace;
-use super::parse::zmtp::{MAX_FRAME, Message, Peer};
+use super::parse::zmtp::{self, MAX_FRAME, Message, Peer};
 use super::parse::{ParseError, edid};
 
 /// Sizes of the pieces in which a stream arrives.
@@ -107,7 +107,7 @@ pub fn lsl_feed(data: &[u8]) {
     assert_eq!(small.1.is_some(), large.1.is_some());
 }
 
-/// Memory is bounded, and what is found does not depend on how the stream is cut.
+/// Memory is bounded, what is found does not depend on how the stream is cut, and it reads the same after it was written.
 pub fn zmtp(data: &[u8]) {
     let [small, large] = CHUNKS.map(|chunk| {
         let mut peer = Peer::default();
@@ -127,6 +127,16 @@ pub fn zmtp(data: &[u8]) {
     });
     assert_eq!(small.0, large.0);
     assert_eq!(small.1.is_some(), large.1.is_some());
+    let frames = |message: &Message| -> Vec<u8> {
+        let last = message.len() - 1;
+        message.iter().enumerate().flat_map(|(index, body)| zmtp::frame(body, index < last)).collect()
+    };
+    let written: Vec<u8> = large.0.iter().flat_map(frames).collect();
+    let mut peer = Peer::default();
+    peer.push(&[&zmtp::greeting()[..], &zmtp::ready("PUB"), &written].concat());
+    let read: Vec<Message> =
+        std::iter::from_fn(|| peer.next_message().expect("what was written is readable")).collect();
+    assert_eq!(read, large.0);
 }
 
 /// What is accepted is finite and bounded, and a message that is cut off is refused.

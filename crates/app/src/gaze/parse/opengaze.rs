@@ -28,8 +28,11 @@ impl Splitter {
         let Some(end) = self.buffer[from..].windows(2).position(|pair| pair == b"/>").map(|at| at + from) else {
             self.searched = self.buffer.len();
             if self.buffer.len() > MAX_TAG {
-                self.buffer = Vec::new();
-                self.searched = 0;
+                // What may be the beginning of a tag is kept.
+                let start = self.buffer.iter().rposition(|byte| *byte == b'<').unwrap_or(self.buffer.len());
+                let kept = self.buffer.split_off(start);
+                self.buffer = if kept.len() > MAX_TAG { Vec::new() } else { kept };
+                self.searched = self.buffer.len();
                 return Some(Err(ParseError::TooLong { what: "a tag", limit: MAX_TAG }));
             }
             return None;
@@ -37,10 +40,11 @@ impl Splitter {
         let rest = self.buffer.split_off(end + 2);
         let tag = std::mem::replace(&mut self.buffer, rest);
         self.searched = 0;
-        if tag.len() > MAX_TAG {
+        let start = tag[..end].iter().rposition(|byte| *byte == b'<').unwrap_or(0);
+        if end - start > MAX_TAG {
             return Some(Err(ParseError::TooLong { what: "a tag", limit: MAX_TAG }));
         }
-        Some(Tag::parse(&tag[..end]))
+        Some(Tag::parse(&tag[start..end]))
     }
 
     /// Bytes held.
@@ -195,9 +199,20 @@ mod tests {
             assert!(splitter.held() <= MAX_TAG + 1024);
         }
         assert!(errors >= 100, "{errors}");
-        splitter.push(b"<REC BPOGX=\"0.1\" BPOGY=\"0.2\" BPOGV=\"1\" />");
+        let record = b"<REC BPOGX=\"0.1\" BPOGY=\"0.2\" BPOGV=\"1\" />";
+        splitter.push(record);
         let last = std::iter::from_fn(|| splitter.next_tag()).last().unwrap().unwrap();
         assert_eq!(last.gaze().unwrap().point, [0.1, 0.2]);
+        // However much came before the record, and wherever a read ends within it.
+        for before in MAX_TAG - 60..MAX_TAG + 2 {
+            let mut splitter = Splitter::default();
+            let mut found = Vec::new();
+            for bytes in [&vec![b'x'; before][..], &record[..20], &record[20..]] {
+                splitter.push(bytes);
+                found.extend(std::iter::from_fn(|| splitter.next_tag()));
+            }
+            assert!(found.last().unwrap().as_ref().unwrap().gaze().is_some(), "{before}: {found:?}");
+        }
     }
 
     #[test]
