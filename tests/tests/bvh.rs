@@ -82,7 +82,8 @@ const BODY: &str = "
     let for_any = Ray(origin, direction, 0.0, 3.0e38, RAY_ANY);
     let for_closest = Ray(origin, direction, 0.0, 3.0e38, RAY_CLOSEST);
     @if(ALPHA) {
-        hits = trace_through(for_any, for_closest, 1u);
+        var transmittance = vec3f(1.0);
+        hits = trace_through(for_any, for_closest, 1u, &transmittance);
     }
     @if(!ALPHA) {
         hits = traverse_pair(for_any, for_closest);
