@@ -66,7 +66,7 @@ fn line(ui: &mut Ui, source: &SourceReport) {
         SourceState::Stalled | SourceState::Lost(_) => theme::NOTICE,
         SourceState::Failed(_) => theme::ERROR,
     };
-    let mark = if *active { "\u{25cf}" } else { "\u{25cb}" };
+    let mark = if *active { ">" } else { "  " };
     ui.add(egui::Label::new(RichText::new(format!("{mark} {name}")).color(colour)).truncate());
     let mut text = status.state.to_string();
     if !status.detail.is_empty() {
@@ -91,7 +91,8 @@ fn calibration(ui: &mut Ui, gaze: &mut GazeControl, index: usize, source: &Sourc
         Calibration::Failed(why) => Some(format!("calibration failed: {why}")),
     };
     ui.horizontal(|ui| {
-        let idle = source.status.calibration != Calibration::Running;
+        let connected = source.status.state == SourceState::Connected;
+        let idle = connected && source.status.calibration != Calibration::Running;
         if ui.add_enabled(idle, egui::Button::new("Calibrate")).on_hover_text("By the tracker's own points").clicked() {
             gaze.calibrate(index, now);
         }
@@ -172,7 +173,7 @@ fn screen(ui: &mut Ui, gaze: &mut GazeControl, now: Instant) {
 
 fn recording(ui: &mut Ui, gaze: &mut GazeControl, rows: Option<u64>, now: Instant) {
     if let Some(rows) = rows {
-        ui.label(RichText::new(format!("\u{25cf} recording, {rows} rows")).color(theme::ERROR));
+        ui.label(RichText::new(format!("recording, {rows} rows")).color(theme::ERROR));
         if ui.button("Stop").clicked() {
             gaze.toggle_recording(now);
         }
