@@ -6,7 +6,6 @@ use std::error::Error;
 use std::path::PathBuf;
 
 use fovea_tests::{device, probes};
-use glam::Vec3;
 use image::{ExtendedColorType, ImageEncoder, codecs::jpeg::JpegEncoder};
 use tracer::{
     distribution::Distribution,
@@ -25,9 +24,10 @@ fn encoded(linear: f64) -> u8 {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
-    let out = arguments.next().ok_or("usage: contact_sheet OUT.jpg [TILE_PX [SPP [FILE...]]]")?;
-    let side = arguments.next().map_or(Ok(160), |text| text.parse::<u32>())?;
-    let spp = arguments.next().map_or(Ok(64), |text| text.parse::<u64>())?;
+    let out = arguments.next().filter(|out| out.ends_with(".jpg"));
+    let out = out.ok_or("usage: contact_sheet OUT.jpg [TILE_PX [SPP [FILE...]]]")?;
+    let side = arguments.next().map_or(Ok(128), |text| text.parse::<u32>())?;
+    let spp = arguments.next().map_or(Ok(24), |text| text.parse::<u64>())?;
     let wanted: Vec<String> = arguments.collect();
     let folder = PathBuf::from(std::env::var_os("FOVEA_SCENES").ok_or("FOVEA_SCENES is not set")?).join("khronos");
 
@@ -48,12 +48,6 @@ fn main() -> Result<(), Box<dyn Error>> {
             let y = tile / columns * side as usize + i / side as usize;
             sheet[(y * width + x) * 3..][..3].copy_from_slice(&pixel.mean.map(encoded));
         }
-        eprintln!(
-            "{}: mean {:.3}",
-            model.file,
-            film.pixels().map(|p| Vec3::from_array(p.mean.map(|v| v as f32))).sum::<Vec3>()
-                / options.film.pixels() as f32
-        );
     }
     let encoder = JpegEncoder::new_with_quality(std::fs::File::create(out)?, JPEG_QUALITY);
     encoder.write_image(&sheet, width as u32, height as u32, ExtendedColorType::Rgb8)?;
