@@ -258,7 +258,7 @@ fn lobes_are_compiled_in_by_their_flags() {
         (Feature::Iridescence, "fresnel_film"),
         (Feature::DiffuseTransmission, "diffuse_transmission_of"),
         (Feature::Transmission, "transmitted_delta"),
-        (Feature::Solid, "glass_albedos"),
+        (Feature::Solid, "refracted"),
         (Feature::ClearSheets, "sheet_transmittance"),
         (Feature::SunDiscs, "sun_discs_radiance"),
         (Feature::Absorption, "absorption * "),

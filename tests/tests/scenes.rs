@@ -300,7 +300,7 @@ fn textures_do_not_alias_and_are_not_blurred() {
     let gpu = device::gpu();
     let mut builder = Builder::new(Vec3::ZERO);
     let texels = [0u8, 255, 255, 0].map(|level| [level, level, level, 255]);
-    let mut pattern = builder.texture(2, TexelEncoding::Linear, texels.to_vec());
+    let mut pattern = builder.texture(2, TexelEncoding::Srgb, texels.to_vec());
     // Squares of 4 / 8192 metres.
     pattern.texture_from_uv = [[4096.0, 0.0, 0.0], [0.0, 4096.0, 0.0]];
     let glow = builder.material(Material { emissive_texture: Some(pattern), ..emitter(Vec3::ONE) });

@@ -51,7 +51,7 @@ pub(super) fn upload(gpu: &Gpu, features: SceneFeatures, bytes: &mut u64) -> wgp
         texels.extend(in_pairs(sheen, ALBEDO_COLUMNS));
         texels.resize((2 * ALBEDO_COLUMNS * ALBEDO_ROWS) as usize, [0.0; 4]);
     }
-    if features.contains(Feature::Solid) {
+    if features.contains(Feature::Specular) {
         let rows = in_pairs(glass_table(), GLASS_SIZE);
         let rest = [[0.0; 4]; (ALBEDO_COLUMNS - GLASS_SIZE) as usize];
         rows.chunks(GLASS_SIZE as usize).for_each(|row| texels.extend(row.iter().chain(&rest)));
