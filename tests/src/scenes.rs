@@ -30,6 +30,34 @@ pub fn even_image(radiance: f32) -> Environment {
     Environment::Image { image, rotation_deg: 20.0, intensity: 1.0 }
 }
 
+/// Points and triangles of a unit sphere.
+fn sphere(rings: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+    let columns = 2 * rings;
+    let point = |row: u32, column: u32| {
+        let (sin_lat, cos_lat) = (std::f32::consts::PI * row as f32 / rings as f32).sin_cos();
+        let (sin_lon, cos_lon) = (std::f32::consts::TAU * (column % columns) as f32 / columns as f32).sin_cos();
+        Vec3::new(cos_lon * sin_lat, cos_lat, sin_lon * sin_lat)
+    };
+    let mut positions = Vec::new();
+    for row in 0..=rings {
+        positions.extend((0..columns).map(|column| point(row, column)));
+    }
+    let at = |row: u32, column: u32| row * columns + column % columns;
+    let mut triangles = Vec::new();
+    for row in 0..rings {
+        for column in 0..columns {
+            let [a, b, c, d] = [at(row, column), at(row, column + 1), at(row + 1, column + 1), at(row + 1, column)];
+            if row > 0 {
+                triangles.push([a, b, c]);
+            }
+            if row + 1 < rings {
+                triangles.push([a, c, d]);
+            }
+        }
+    }
+    (positions, triangles)
+}
+
 impl Builder {
     /// Nothing but a constant environment.
     pub fn new(environment: Vec3) -> Self {
@@ -80,30 +108,15 @@ impl Builder {
 
     /// Adds a sphere of unit radius with smooth normals, `rings` from pole to pole.
     pub fn sphere(&mut self, rings: u32) -> u32 {
-        let columns = 2 * rings;
-        let point = |row: u32, column: u32| {
-            let (sin_lat, cos_lat) = (std::f32::consts::PI * row as f32 / rings as f32).sin_cos();
-            let (sin_lon, cos_lon) = (std::f32::consts::TAU * (column % columns) as f32 / columns as f32).sin_cos();
-            Vec3::new(cos_lon * sin_lat, cos_lat, sin_lon * sin_lat)
-        };
-        let mut positions = Vec::new();
-        for row in 0..=rings {
-            positions.extend((0..columns).map(|column| point(row, column)));
-        }
-        let at = |row: u32, column: u32| row * columns + column % columns;
-        let mut triangles = Vec::new();
-        for row in 0..rings {
-            for column in 0..columns {
-                let [a, b, c, d] = [at(row, column), at(row, column + 1), at(row + 1, column + 1), at(row + 1, column)];
-                if row > 0 {
-                    triangles.push([a, b, c]);
-                }
-                if row + 1 < rings {
-                    triangles.push([a, c, d]);
-                }
-            }
-        }
+        let (positions, triangles) = sphere(rings);
         self.add(positions.clone(), positions, Vec::new(), triangles)
+    }
+
+    /// Adds the same triangles with flat normals.
+    pub fn faceted_sphere(&mut self, rings: u32) -> u32 {
+        let (positions, triangles) = sphere(rings);
+        let corners: Vec<[Vec3; 3]> = triangles.iter().map(|t| t.map(|v| positions[v as usize])).collect();
+        self.triangles(&corners, &[])
     }
 
     fn add(&mut self, positions: Vec<Vec3>, normals: Vec<Vec3>, uv: Vec<Vec2>, triangles: Vec<[u32; 3]>) -> u32 {

@@ -150,12 +150,10 @@ fn sibenik_is_as_by_cycles_outside_the_mask() {
 
 #[test]
 fn sponza_is_as_by_cycles_outside_the_mask() {
-    // Known to miss 0.95: the folded diffuse lobe under a low sun; docs/reports/cycles.md, 1.
     compare_unmasked("sponza", 8, 0.03, 0.95);
 }
 
 #[test]
 fn classroom_is_as_by_cycles_outside_the_mask() {
-    // Known to miss 0.95: Schlick's approximation on the floor; docs/reports/cycles.md, 2.
     compare_unmasked("classroom", 16, 0.06, 0.95);
 }

@@ -150,13 +150,13 @@ fn an_emissive_rectangle_by_each_way_of_sampling() {
     assert_techniques_agree(&gpu, "rectangle over a plane", &builder.build(), ray, 1, 0.7 * 3.0 * factor);
 }
 
-/// A convex body shows its albedo times the radiance about it, whatever its shading normals are.
+/// A convex body shows its albedo times the radiance about it.
 #[test]
 fn a_sphere_in_a_constant_environment_by_each_way_of_sampling() {
     let gpu = device::gpu();
     let mut builder = Builder::new(Vec3::ZERO);
     let material = builder.material(lambert(Vec3::splat(0.6)));
-    let sphere = builder.sphere(8);
+    let sphere = builder.faceted_sphere(8);
     builder.place(sphere, material, Affine3A::IDENTITY);
     let mut scene = builder.build();
     scene.environment = even_image(1.0);
