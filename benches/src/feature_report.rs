@@ -1,6 +1,6 @@
 //! `feature-report OUT_DIR SCENE...`: what each compile-time feature costs where it is not needed.
 //!
-//! For the built-in scene and each file: seconds to trace 2^17 samples (OD, 8 bounces) with the scene's own kernel, with each
+//! For the built-in scene and each file: seconds to trace 2^16 samples (OD, 8 bounces) with the scene's own kernel, with each
 //! further feature alone, and with all of them; the kernels take turns, the fastest of their runs counts. Also the kernels'
 //! size and the time to compile them. Writes `features.json` (raw numbers) and `features.md` (the table).
 
@@ -18,8 +18,8 @@ use tracer::{
     renderer::{Renderer, RendererOptions},
 };
 
-const SAMPLES: u64 = 1 << 17;
-const ROUNDS: u32 = 5;
+const SAMPLES: u64 = 1 << 16;
+const ROUNDS: u32 = 4;
 
 type AnyError = Box<dyn std::error::Error>;
 
@@ -119,7 +119,7 @@ fn table(raw: &Value) -> String {
         }
     }
     text.push_str(
-        "- 2^17 samples, OD, film 2048x1024, 8 bounces; the kernels take turns, the fastest of 5 runs counts\n\
+        "- 2^16 samples, OD, film 2048x1024, 8 bounces; the kernels take turns, the fastest of 4 runs counts\n\
          - a feature is compiled in with those that it never occurs without\n\
          - made by `cargo run --release -p fovea-benches --bin feature-report -- docs/reports SCENE...`; raw numbers in \
          features.json\n",

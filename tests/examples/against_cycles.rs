@@ -64,6 +64,9 @@ fn line(blocks: &[Option<Block>]) -> String {
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let out = arguments.first().ok_or("usage: against_cycles masks | OUT_FOLDER SPP [NAME...]")?;
+    if out != "masks" {
+        std::fs::create_dir_all(out)?;
+    }
     let spp = arguments.get(1).map(|text| text.parse::<u64>()).transpose()?;
     let wanted = arguments.get(2..).unwrap_or_default();
     let (scenes, references) = (folder("FOVEA_SCENES")?.join("paper"), folder("FOVEA_REFERENCE")?.join("cycles"));

@@ -123,7 +123,7 @@ fn request(info: &StreamInfo) -> String {
         "Supports-Subnormals: 1".into(),
         format!("Value-Size: {size}"),
         "Data-Protocol-Version: 110".into(),
-        // Samples that the source may keep for us. liblsl 1.18 hangs when a small queue overflows, so it is a minute's worth.
+        // Samples that the source may keep for us, a minute's worth. With room for one only, a liblsl 1.18 outlet was seen to hang.
         format!("Max-Buffer-Length: {}", (info.nominal_rate_hz.min(2000.0) * 60.0).max(4096.0)),
         "Max-Chunk-Length: 1".into(),
         "Hostname: ".into(),
