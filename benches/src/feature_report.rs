@@ -6,7 +6,7 @@
 
 use std::{path::Path, process::ExitCode, sync::Arc, time::Instant};
 
-use fovea_benches::Subject;
+use fovea_benches::{AnyError, Subject, report_main};
 use fovea_sampler::{Angle, Geometry, Inverse, RadialDistribution, Reddy2001};
 use serde_json::{Value, json};
 use tracer::{
@@ -21,16 +21,8 @@ use tracer::{
 const SAMPLES: u64 = 1 << 16;
 const ROUNDS: u32 = 4;
 
-type AnyError = Box<dyn std::error::Error>;
-
 fn main() -> ExitCode {
-    match run(&std::env::args().skip(1).collect::<Vec<_>>()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(2)
-        }
-    }
+    report_main(run)
 }
 
 fn run(args: &[String]) -> Result<(), AnyError> {

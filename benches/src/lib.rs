@@ -1,6 +1,6 @@
 //! What the benches and reports share.
 
-use std::{path::Path, sync::Arc};
+use std::{path::Path, process::ExitCode, sync::Arc};
 
 use glam::{Affine3A, DVec3, Quat, Vec3};
 use tracer::{
@@ -41,6 +41,20 @@ pub fn one_triangle() -> Scene {
         cameras: Vec::new(),
         environment: Environment::Constant(Vec3::ONE),
         origin_in_file: DVec3::ZERO,
+    }
+}
+
+/// Whatever ends a report.
+pub type AnyError = Box<dyn std::error::Error>;
+
+/// Runs a report with the command line's words; an error is one line and exit status 2.
+pub fn report_main(run: impl FnOnce(&[String]) -> Result<(), AnyError>) -> ExitCode {
+    match run(&std::env::args().skip(1).collect::<Vec<_>>()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(2)
+        }
     }
 }
 

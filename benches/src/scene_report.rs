@@ -7,7 +7,7 @@
 
 use std::{path::Path, process::ExitCode, sync::Arc, time::Instant};
 
-use fovea_benches::Subject;
+use fovea_benches::{AnyError, Subject, report_main};
 use fovea_sampler::{Angle, Geometry, Inverse, RadialDistribution, Reddy2001};
 use glam::{Quat, Vec3};
 use serde_json::{Value, json};
@@ -19,16 +19,8 @@ use tracer::{
     view::{DebugView, ToneMap, ViewProjection, ViewSettings},
 };
 
-type AnyError = Box<dyn std::error::Error>;
-
 fn main() -> ExitCode {
-    match run(&std::env::args().skip(1).collect::<Vec<_>>()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(2)
-        }
-    }
+    report_main(run)
 }
 
 fn run(args: &[String]) -> Result<(), AnyError> {
