@@ -42,7 +42,6 @@ const LEAST_SHEEN_ALPHA: f64 = 0.01;
 
 /// Width and texels of the table that the features need; one texel when they need none.
 pub(super) fn upload(gpu: &Gpu, features: SceneFeatures, bytes: &mut u64) -> wgpu::TextureView {
-    use wgpu::util::DeviceExt;
     let layered = [Feature::Specular, Feature::Clearcoat, Feature::Sheen];
     let mut texels = Vec::new();
     if layered.iter().any(|&feature| features.contains(feature)) {
@@ -61,23 +60,7 @@ pub(super) fn upload(gpu: &Gpu, features: SceneFeatures, bytes: &mut u64) -> wgp
         (texels, size) = (vec![[0.0; 4]], [1, 1]);
     }
     *bytes += texels.len() as u64 * 16;
-    gpu.device
-        .create_texture_with_data(
-            &gpu.queue,
-            &wgpu::TextureDescriptor {
-                label: Some("lobe tables"),
-                size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format: wgpu::TextureFormat::Rgba32Float,
-                usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-                view_formats: &[],
-            },
-            wgpu::util::TextureDataOrder::LayerMajor,
-            bytemuck::cast_slice(&texels),
-        )
-        .create_view(&Default::default())
+    super::upload_image(gpu, "lobe tables", size, &texels)
 }
 
 /// Each texel holds an entry and its neighbour along the row: interpolation needs half as many loads.

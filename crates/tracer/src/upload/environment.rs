@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::Vec3;
 
-use super::{AliasTable, UploadError, lights::luminance};
+use super::{AliasTable, UploadError, lights::luminance, upload_image};
 use crate::{
     gpu::Gpu,
     scene::{Environment, EnvironmentImage},
@@ -34,8 +34,8 @@ impl EnvironmentOnGpu {
     pub fn build(gpu: &Gpu, environment: &Environment, bytes: &mut u64) -> Result<Self, UploadError> {
         Ok(match environment {
             Environment::Constant(radiance) => Self {
-                image: upload_image(gpu, 1, 1, &[[0.0; 4]]),
-                cells: upload_image(gpu, 1, 1, &[[0.0; 4]]),
+                image: upload_image(gpu, "environment", [1, 1], &[[0.0; 4]]),
+                cells: upload_image(gpu, "environment", [1, 1], &[[0.0; 4]]),
                 cells_size: [0; 2],
                 radiance: *radiance,
                 rotation_turns: 0.0,
@@ -56,8 +56,8 @@ impl EnvironmentOnGpu {
                 *bytes += (texels.len() + cells.len()) as u64 * 16;
                 let brightest = image.pixels.iter().flatten().fold(0.0f32, |a, &b| a.max(b)) * intensity;
                 Self {
-                    image: upload_image(gpu, image.width, image.height, &texels),
-                    cells: upload_image(gpu, cells_size[0], cells_size[1], &cells),
+                    image: upload_image(gpu, "environment image", [image.width, image.height], &texels),
+                    cells: upload_image(gpu, "environment grid", cells_size, &cells),
                     cells_size,
                     radiance: Vec3::splat(*intensity),
                     rotation_turns: rotation_deg / 360.0,
@@ -66,27 +66,6 @@ impl EnvironmentOnGpu {
             }
         })
     }
-}
-
-fn upload_image(gpu: &Gpu, width: u32, height: u32, texels: &[[f32; 4]]) -> wgpu::TextureView {
-    use wgpu::util::DeviceExt;
-    gpu.device
-        .create_texture_with_data(
-            &gpu.queue,
-            &wgpu::TextureDescriptor {
-                label: Some("environment image"),
-                size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format: wgpu::TextureFormat::Rgba32Float,
-                usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-                view_formats: &[],
-            },
-            wgpu::util::TextureDataOrder::LayerMajor,
-            bytemuck::cast_slice(texels),
-        )
-        .create_view(&Default::default())
 }
 
 /// Cells weighted by luminance and solid angle. A cell's luminance is the mean over the pixels within half a pixel of
