@@ -8,7 +8,7 @@ use fovea_tests::{
     device, pencil,
     scenes::{Builder, emitter, even_image, lambert},
 };
-use glam::{Affine3A, Quat, Vec3};
+use glam::{Affine3A, DVec3, Quat, Vec3};
 use tracer::{
     distribution::{Distribution, Gaze},
     film::FilmOptions,
@@ -216,6 +216,38 @@ fn punctual_lights() {
     builder.light(PunctualLight { name: String::new(), kind, intensity: Vec3::splat(5.0), position, rotation });
     let beside = target + Vec3::new(0.0, 0.0, 4.0);
     assert_eq!(measure(&gpu, &builder.build(), [Vec3::new(-3.0, 2.0, 0.0), beside], 1), (0.0, 0.0));
+}
+
+/// A map that tilts the normal by a constant: Lambert's cosine to the mapped normal, masked as by bumps of that tilt.
+#[test]
+fn a_tilted_normal_map_under_a_sun() {
+    let gpu = device::gpu();
+    // Red and green are along +X and -Z here; the blue is what makes it a unit vector, to 8 bits.
+    let texel = [204u8, 128, 230, 255];
+    let [x, y, z] = [0, 1, 2].map(|channel| f64::from(texel[channel]) / 255.0 * 2.0 - 1.0);
+    let mapped = DVec3::new(x, z, -y).normalize();
+    let tan2_tilt = mapped.y.powi(-2) - 1.0;
+    for (elevation_deg, azimuth_deg) in [(80.0f64, 0.0f64), (30.0, 0.0), (10.0, 30.0), (40.0, 180.0), (5.0, 0.0)] {
+        let (elevation, azimuth) = (elevation_deg.to_radians(), azimuth_deg.to_radians());
+        let to_sun = DVec3::new(elevation.cos() * azimuth.cos(), elevation.sin(), elevation.cos() * azimuth.sin());
+        let tan2_light = to_sun.y.powi(-2) - 1.0;
+        let unmasked = 2.0 / (1.0 + (1.0 + (tan2_tilt / 8.0).min(1.0) * tan2_light).sqrt());
+        let expected = 5.0 * 0.4 / PI * mapped.dot(to_sun).max(0.0) * unmasked;
+
+        let mut builder = Builder::new(Vec3::ZERO);
+        let map = builder.texture(1, TexelEncoding::Linear, vec![texel]);
+        let material = builder.material(Material { normal_texture: Some(map), ..lambert(Vec3::splat(0.4)) });
+        builder.quad(Vec3::new(-20.0, 0.0, -20.0), Vec3::Z * 40.0, Vec3::X * 40.0, material);
+        builder.light(PunctualLight {
+            name: String::new(),
+            kind: PunctualKind::Directional { angular_diameter: 0.0 },
+            intensity: Vec3::splat(5.0),
+            position: Vec3::ZERO,
+            rotation: Quat::from_rotation_arc(Vec3::NEG_Z, -to_sun.as_vec3()),
+        });
+        let value = measure(&gpu, &builder.build(), [Vec3::new(-3.0, 2.0, 0.0), Vec3::ZERO], 1);
+        assert_is(&format!("sun at {elevation_deg}, {azimuth_deg} degrees"), value, expected);
+    }
 }
 
 /// A sun of any size lights a surface that faces it with its lux; seen directly and in a mirror it has their radiance.
