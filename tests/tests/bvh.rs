@@ -114,7 +114,7 @@ fn hits(scene: &Scene) -> Vec<Option<(f64, u32, u32)>> {
         .map(|words| {
             assert_eq!(words[6], 1);
             let value = |low: usize| {
-                (f64::from(words[low]) + f64::from(words[low + 1]) * 4_294_967_296.0) / film.radiance_scale
+                (f64::from(words[low]) + f64::from(words[low + 1]) * 4_294_967_296.0) / film.header.radiance_scale
             };
             let source = (value(4) * 256.0) as u32;
             assert!(source < 15 * 256, "the nearest hit and any hit disagree on whether there is one");

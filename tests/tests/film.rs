@@ -138,7 +138,7 @@ fn power_of_two(n: u32) -> f32 {
     );
     let samples = 3u32 << 19;
     let snapshot = device::trace(&mut renderer, u64::from(samples)).unwrap();
-    assert_eq!((snapshot.radiance_scale, snapshot.luminance_scale), (RADIANCE_SCALE, LUMINANCE_SCALE));
+    assert_eq!((snapshot.header.radiance_scale, snapshot.header.luminance_scale), (RADIANCE_SCALE, LUMINANCE_SCALE));
 
     let mut expected = vec![Sums::default(); film.pixels() as usize];
     for index in 0..samples {

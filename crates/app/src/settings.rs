@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 use tracer::film::FilmMapping;
 use tracer::renderer::{FilmPose, RendererOptions, SequenceKind};
-use tracer::scene::{ContentHash, Environment, Scene};
+use tracer::scene::Scene;
 
 use crate::cli::choices::{Geometry, InverseForm, Mode, Sequence, ToneMapping};
 use crate::sampling::Acuity;
@@ -35,7 +35,7 @@ impl RunSettings<'_> {
         };
         json!({
             "scene": self.scene.name,
-            "scene_hash": scene_hash(self.scene).to_string(),
+            "scene_hash": self.scene.content_hash().to_string(),
             "seed": self.renderer.seed,
             "first_sample": 0,
             "samples": self.samples,
@@ -65,21 +65,6 @@ pub fn mode_name(mode: Mode) -> &'static str {
         Mode::VpRegion => "vp-region",
         Mode::Fv => "fv",
     }
-}
-
-/// Hash of all that a scene's picture depends on. Equal for equal scenes in every run of one version of the program.
-pub fn scene_hash(scene: &Scene) -> ContentHash {
-    let parts = scene.meshes.iter().map(|mesh| mesh.hash).chain(scene.textures.iter().map(|texture| texture.hash));
-    let parts: Vec<u8> = parts.flat_map(|hash| hash.0.to_le_bytes()).collect();
-    let environment = match &scene.environment {
-        Environment::Constant(radiance) => format!("{radiance:?}"),
-        Environment::Image { image, rotation_deg, intensity } => {
-            format!("{} {rotation_deg:?} {intensity:?}", image.hash)
-        }
-    };
-    // Debug prints floats so that they read back exactly: different values have different texts.
-    let rest = format!("{:?} {:?} {:?}", scene.materials, scene.instances, scene.lights);
-    ContentHash::of(&[&parts, environment.as_bytes(), rest.as_bytes()])
 }
 
 impl From<Sequence> for SequenceKind {

@@ -12,7 +12,8 @@ use crate::{
 mod probe;
 mod snapshot;
 
-pub use snapshot::{FilmPixel, FilmSnapshot};
+pub use snapshot::{DamagedFilm, FilmDifference, FilmHeader, FilmPixel, FilmSnapshot, SampleRange};
+pub(crate) use snapshot::{LAST_SAMPLE, joined};
 
 /// What a film pixel stands for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -125,6 +126,19 @@ impl Film {
             encoder.clear_buffer(&slab.buffer, 0, None);
         }
         encoder.clear_buffer(&self.counters, 0, None);
+    }
+
+    /// Replaces all sums; `words` must be as many as the film has.
+    pub fn write(&self, gpu: &Gpu, words: &[u32], counters: FilmCounters) {
+        for slab in &self.slabs {
+            let words_of = |pixels: u32| pixels as usize * FILM_WORDS as usize;
+            let first = words_of(slab.first_pixel);
+            let slab_words = &words[first..first + words_of(slab.pixel_count)];
+            gpu.queue.write_buffer(&slab.buffer, 0, bytemuck::cast_slice(slab_words));
+            // Writes are staged until the next submission: one slab's worth at a time.
+            gpu.queue.submit([]);
+        }
+        gpu.queue.write_buffer(&self.counters, 0, bytemuck::bytes_of(&counters));
     }
 
     /// Reads all slabs back, waiting for the device.

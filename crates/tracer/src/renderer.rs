@@ -7,21 +7,23 @@ use thiserror::Error;
 
 mod batch;
 mod generation;
+mod restore;
 mod split;
 
 use batch::BoundKernels;
+pub use restore::RestoreError;
 
 use crate::{
     distribution::Distribution,
     features::{Feature, SceneFeatures},
-    film::{Film, FilmMapping, FilmOptions, FilmSnapshot, ReadError},
+    film::{Film, FilmMapping, FilmOptions, LAST_SAMPLE, ReadError, SampleRange},
     gpu::Gpu,
     kernels::{
         self, Kernel, KernelConstants, KernelKey, ShaderSources,
         layout::{BatchParams, SampleRecord},
         pipelines::{KernelError, PipelineCache},
     },
-    scene::Scene,
+    scene::{ContentHash, Scene},
     upload::{BlasCache, SceneOnGpu, UploadError, UploadReport},
     view::{ViewRenderer, ViewSettings},
 };
@@ -126,7 +128,7 @@ pub struct SceneReport {
     pub environment_share: f32,
 }
 
-/// What was traced since the last restart.
+/// What is in the film, counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RenderStatistics {
     /// Samples.
@@ -175,8 +177,13 @@ pub struct Renderer {
     params: Vec<wgpu::Buffer>,
     records: wgpu::Buffer,
     direction_numbers: wgpu::Buffer,
+    /// In the film.
     samples: u64,
     first_sample: u64,
+    next_sample: u64,
+    /// What the film held when it was restored from a snapshot.
+    restored: Vec<SampleRange>,
+    scene_hash: ContentHash,
     view: ViewRenderer,
 }
 
@@ -226,6 +233,9 @@ impl Renderer {
             direction_numbers,
             samples: 0,
             first_sample: 0,
+            next_sample: 0,
+            restored: Vec::new(),
+            scene_hash: ContentHash::default(),
         };
         renderer.upload_pixel_list();
         Ok(renderer)
@@ -249,6 +259,7 @@ impl Renderer {
             return Err(error);
         }
         let kernel_compile_secs = started.elapsed().as_secs_f64();
+        self.scene_hash = scene.content_hash();
         self.split_light_samples(scene)?;
         let environment_share = self.scene.as_ref().map_or(0.0, |scene| scene.environment_probability);
         self.restart();
@@ -278,7 +289,7 @@ impl Renderer {
             self.bind()?;
             return Err(error);
         }
-        self.samples = 0;
+        self.forget_samples();
         Ok(())
     }
 
@@ -383,17 +394,27 @@ impl Renderer {
         let mut encoder = self.encoder("restart");
         self.film.clear(&mut encoder);
         self.gpu.queue.submit([encoder.finish()]);
-        self.samples = 0;
+        self.forget_samples();
     }
 
-    /// Samples traced since the last restart.
+    fn forget_samples(&mut self) {
+        self.samples = 0;
+        self.next_sample = self.first_sample;
+        self.restored.clear();
+    }
+
+    /// Samples in the film: traced since the last restart, and those of the snapshot that it was restored from.
     pub fn samples(&self) -> u64 {
         self.samples
     }
 
-    /// Index of the first sample after a restart: renders of disjoint ranges of one seed can be merged.
+    /// Index of the first sample of an empty film, at most 2^62: renders of disjoint ranges of one seed can be merged. A
+    /// film that has samples goes on as it was until it restarts.
     pub fn set_first_sample(&mut self, first: u64) {
-        self.first_sample = first;
+        self.first_sample = first.min(LAST_SAMPLE);
+        if self.samples == 0 {
+            self.next_sample = self.first_sample;
+        }
     }
 
     /// The options that this renderer was made with.
@@ -421,11 +442,12 @@ impl Renderer {
         bound.record(&mut encoder, samples);
         self.gpu.queue.submit([encoder.finish()]);
         self.samples += u64::from(samples);
+        self.next_sample += u64::from(samples);
         Ok(samples)
     }
 
     fn next_batch(&self, wanted: u32) -> u32 {
-        let first = self.first_sample + self.samples;
+        let first = self.next_sample;
         let aligned = if first == 0 { LARGEST_BATCH } else { 1 << first.trailing_zeros().min(LARGEST_BATCH.ilog2()) };
         let wanted = wanted.clamp(1, LARGEST_BATCH);
         aligned.min(1 << wanted.ilog2())
@@ -461,22 +483,7 @@ impl Renderer {
         }
     }
 
-    /// Reads the film back, waiting for the device.
-    ///
-    /// # Errors
-    /// When the device is lost.
-    pub fn snapshot(&self) -> Result<FilmSnapshot, RenderError> {
-        let (radiance_scale, luminance_scale) = self.film_scales();
-        Ok(FilmSnapshot {
-            options: self.options.film,
-            words: self.film.read(&self.gpu)?,
-            radiance_scale: f64::from(radiance_scale),
-            luminance_scale: f64::from(luminance_scale),
-            samples: self.samples,
-        })
-    }
-
-    /// Counts since the last restart, waiting for the device.
+    /// What is in the film, counted; waiting for the device.
     ///
     /// # Errors
     /// When the device is lost.

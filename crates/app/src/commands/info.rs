@@ -7,7 +7,6 @@ use tracer::scene::{Environment, Projection, PunctualKind, Scene};
 use super::{print_json, print_text};
 use crate::cli::InfoArgs;
 use crate::session::{self, Source};
-use crate::settings::scene_hash;
 
 /// Prints what the scene holds.
 ///
@@ -22,7 +21,7 @@ fn describe(scene: &Scene, report: &ImportReport) -> Value {
     let (low, high) = scene.bounds().unwrap_or_default();
     json!({
         "scene": scene.name,
-        "scene_hash": scene_hash(scene).to_string(),
+        "scene_hash": scene.content_hash().to_string(),
         "generator": report.generator,
         "triangles": session::triangles(scene),
         "meshes": scene.meshes.len(),

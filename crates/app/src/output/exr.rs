@@ -40,8 +40,8 @@ impl FilmFile {
     pub fn new(snapshot: &FilmSnapshot, settings: Value) -> Self {
         let pixels: Vec<_> = snapshot.pixels().collect();
         Self {
-            width: snapshot.options.width as usize,
-            height: snapshot.options.height as usize,
+            width: snapshot.header.options.width as usize,
+            height: snapshot.header.options.height as usize,
             rgb: pixels.iter().map(|pixel| pixel.mean.map(|component| component as f32)).collect(),
             variance: pixels.iter().map(|pixel| pixel.variance_of_mean as f32).collect(),
             samples: pixels.iter().map(|pixel| pixel.samples).collect(),

@@ -46,7 +46,7 @@ impl Renderer {
     pub(super) fn batch_params(&self, samples: u32) -> Result<BatchParams, RenderError> {
         let scene = self.scene.as_ref().ok_or(RenderError::NoScene)?;
         let (layers, layer_count, _) = self.distribution.encode();
-        let first = self.first_sample + self.samples;
+        let first = self.next_sample;
         let (radiance_scale, luminance_scale) = self.film_scales();
         let columns = order_columns(samples.max(1).ilog2());
         let mut order = [[0; 4]; 5];

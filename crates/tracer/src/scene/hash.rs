@@ -1,4 +1,6 @@
-//! Content hashes: what tells two versions of a part apart.
+//! Content hashes: what tells two versions of a part, or of a whole scene, apart.
+
+use super::{Environment, Scene};
 
 /// 128-bit hash of a part's content. Equal content has equal hashes in every run and on every platform.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -26,8 +28,35 @@ impl ContentHash {
     }
 }
 
+impl std::str::FromStr for ContentHash {
+    type Err = std::num::ParseIntError;
+
+    /// Reads what `Display` writes: 32 hexadecimal digits.
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        u128::from_str_radix(text, 16).map(Self)
+    }
+}
+
 impl std::fmt::Display for ContentHash {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{:032x}", self.0)
+    }
+}
+
+impl Scene {
+    /// Hash of all that the scene's films depend on; names count too. Equal for equal scenes in every run of one version
+    /// of the program. The cameras count because the split of light samples is measured from them.
+    pub fn content_hash(&self) -> ContentHash {
+        let parts = self.meshes.iter().map(|mesh| mesh.hash).chain(self.textures.iter().map(|texture| texture.hash));
+        let parts: Vec<u8> = parts.flat_map(|hash| hash.0.to_le_bytes()).collect();
+        let environment = match &self.environment {
+            Environment::Constant(radiance) => format!("{radiance:?}"),
+            Environment::Image { image, rotation_deg, intensity } => {
+                format!("{} {rotation_deg:?} {intensity:?}", image.hash)
+            }
+        };
+        // Debug prints floats so that they read back exactly: different values have different texts.
+        let rest = format!("{:?} {:?} {:?} {:?}", self.materials, self.instances, self.lights, self.cameras);
+        ContentHash::of(&[&parts, environment.as_bytes(), rest.as_bytes()])
     }
 }
