@@ -110,7 +110,7 @@ fn permutations_validate_and_structures_lie_as_on_the_host() {
     for kernel in Kernel::ALL {
         for features in permutations() {
             // Only the path kernels look at the scene's features, and all at the film's.
-            let scene_matters = matches!(kernel, Kernel::Trace | Kernel::Generate);
+            let scene_matters = matches!(kernel, Kernel::Trace | Kernel::Generate | Kernel::Query);
             let film_only = SceneFeatures::default().with(Feature::PerspectiveFilm, true);
             if !scene_matters && features != SceneFeatures::default() && features != film_only {
                 continue;
@@ -167,6 +167,7 @@ fn constants_are_those_of_the_host() {
     let sources = sources();
     let mut shader = constants(sources.module("types").unwrap());
     shader.extend(constants(sources.module("view::bindings").unwrap()));
+    shader.extend(constants(sources.module("scene::traverse").unwrap()));
     let host = host![
         LAYER_FILM,
         LAYER_SPHERE,
@@ -174,6 +175,8 @@ fn constants_are_those_of_the_host() {
         LAYER_PIXEL_LIST,
         LAYER_GAZE,
         LAYER_GAZE_AT_EYE,
+        RAY_CLOSEST,
+        RAY_ANY,
         NONE,
         INSTANCE_MIRRORED,
         INSTANCE_STATIC,

@@ -53,6 +53,7 @@ const MODULES: &[(&str, &str)] = &[
     ("scene::traverse", include_str!("../../../shaders/scene/traverse.wesl")),
     ("scene::texture", include_str!("../../../shaders/scene/texture.wesl")),
     ("scene::alpha", include_str!("../../../shaders/scene/alpha.wesl")),
+    ("scene::query", include_str!("../../../shaders/scene/query.wesl")),
     ("scene::surface", include_str!("../../../shaders/scene/surface.wesl")),
     ("shading::fresnel", include_str!("../../../shaders/shading/fresnel.wesl")),
     ("shading::layers", include_str!("../../../shaders/shading/layers.wesl")),
@@ -84,6 +85,8 @@ pub enum Kernel {
     Trace,
     /// Only the choice of the pixel and the primary ray, for the bench of ray generation.
     Generate,
+    /// What a list of rays meets.
+    Query,
     /// Records to film.
     Accumulate,
     /// Film to view.
@@ -98,14 +101,23 @@ pub enum Kernel {
 
 impl Kernel {
     /// Every kernel.
-    pub const ALL: [Self; 7] =
-        [Self::Trace, Self::Generate, Self::Accumulate, Self::Gather, Self::Pull, Self::Push, Self::Present];
+    pub const ALL: [Self; 8] = [
+        Self::Trace,
+        Self::Generate,
+        Self::Query,
+        Self::Accumulate,
+        Self::Gather,
+        Self::Pull,
+        Self::Push,
+        Self::Present,
+    ];
 
     /// Module below `shaders/`, which is also the label of pipeline, timer and dump.
     pub const fn module(self) -> &'static str {
         match self {
             Self::Trace => "path::trace",
             Self::Generate => "path::generate",
+            Self::Query => "scene::query",
             Self::Accumulate => "film::accumulate",
             Self::Gather => "view::gather",
             Self::Pull => "view::pull",
@@ -119,6 +131,7 @@ impl Kernel {
         match self {
             Self::Trace => "trace",
             Self::Generate => "generate",
+            Self::Query => "query",
             Self::Accumulate => "accumulate",
             Self::Gather => "gather",
             Self::Pull => "pull",
@@ -217,7 +230,7 @@ impl fmt::Display for KernelKey {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let name = self.kernel.module().replace("::", "-");
         match self.kernel {
-            Kernel::Trace | Kernel::Generate => {
+            Kernel::Trace | Kernel::Generate | Kernel::Query => {
                 write!(f, "{name}.{}.{}.stack{}", self.features, self.sources.sampler_name, self.constants.stack_size)
             }
             _ => write!(f, "{name}"),

@@ -7,10 +7,13 @@ use thiserror::Error;
 
 mod batch;
 mod generation;
+mod query;
 mod restore;
 mod split;
+mod timing;
 
 use batch::BoundKernels;
+pub use query::{Query, QueryAnswer, RayKind};
 pub use restore::RestoreError;
 
 use crate::{
@@ -542,11 +545,11 @@ impl Renderer {
     pub fn key(&self, kernel: Kernel) -> KernelKey {
         let perspective = matches!(self.options.film.mapping, FilmMapping::Perspective { .. });
         let scene = self.scene.as_ref();
-        let features = if kernel == Kernel::Trace {
-            scene
-                .map(|s| s.features)
-                .unwrap_or_default()
-                .union(self.spare_features)
+        let own = scene.map(|s| s.features).unwrap_or_default();
+        let features = if kernel == Kernel::Query {
+            own
+        } else if kernel == Kernel::Trace {
+            own.union(self.spare_features)
                 .with(Feature::LightSamplingOnly, self.technique == SamplingTechnique::Lights)
                 .with(Feature::BsdfSamplingOnly, self.technique == SamplingTechnique::Bsdf)
         } else {
@@ -555,7 +558,7 @@ impl Renderer {
         KernelKey {
             kernel,
             features: features.with(Feature::PerspectiveFilm, perspective),
-            constants: if kernel == Kernel::Trace {
+            constants: if matches!(kernel, Kernel::Trace | Kernel::Query) {
                 scene.map(|s| s.constants).unwrap_or_default()
             } else {
                 KernelConstants::default()

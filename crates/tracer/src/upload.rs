@@ -75,6 +75,8 @@ pub struct SceneOnGpu {
     pub constants: KernelConstants,
     /// Buffers and textures in the order of `shaders/path_bindings.wesl`, group 1.
     pub bindings: SceneBindings,
+    /// The scene's instance behind each entry of the instance table; `None` for the static mesh as a whole.
+    pub sources: Vec<Option<u32>>,
     /// Entries of the light table.
     pub light_count: u32,
     /// Probability of sampling the environment instead of a light.
@@ -193,6 +195,7 @@ impl SceneOnGpu {
                 buffers,
                 textures: [texels.srgb, texels.linear, environment.image, environment.cells, lobe_tables],
             },
+            sources: geometry.sources,
             light_count,
             environment_probability: match (has_image, light_count > 0) {
                 (true, true) => 0.5,

@@ -104,6 +104,22 @@ shared! {
         pad_0: [u32; 2],
     }
 
+    /// A ray to be answered alone.
+    struct QueryRay {
+        origin: [f32; 3],
+        t_max: f32,
+        direction: [f32; 3],
+        kind: u32,
+    }
+
+    /// What it meets.
+    struct QueryHit {
+        t: f32,
+        part: u32,
+        triangle: u32,
+        steps: u32,
+    }
+
     /// A mesh placed in the world.
     struct Instance {
         world_from_mesh: [[f32; 4]; 3],
@@ -254,6 +270,8 @@ pub mod codes {
     pub const LAYER_PIXEL_LIST: u32 = 3;
     pub const LAYER_GAZE: u32 = 4;
     pub const LAYER_GAZE_AT_EYE: u32 = 5;
+    pub const RAY_CLOSEST: u32 = 1;
+    pub const RAY_ANY: u32 = 2;
     pub const NONE: u32 = u32::MAX;
     pub const INSTANCE_MIRRORED: u32 = 1;
     pub const INSTANCE_STATIC: u32 = 2;

@@ -67,10 +67,19 @@ impl Pipeline {
             immediate_size: 0,
         });
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let shader = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(&label),
-            source: wgpu::ShaderSource::Wgsl(text.into()),
-        });
+        let descriptor =
+            wgpu::ShaderModuleDescriptor { label: Some(&label), source: wgpu::ShaderSource::Wgsl(text.into()) };
+        // Clamping every index and counting every loop takes a fifth of the traversal's time on lavapipe (docs/reports/traversal.md).
+        let checks = wgpu::ShaderRuntimeChecks {
+            bounds_checks: false,
+            force_loop_bounding: false,
+            ..wgpu::ShaderRuntimeChecks::checked()
+        };
+        // SAFETY: the kernels' indices come from tables that this crate builds from a scene whose own indices the host has
+        // followed while building them, from pixels of the bound film, and from counters below an array's length; every loop
+        // ends when a finite hierarchy, list or number of bounces is used up.
+        #[expect(unsafe_code, reason = "the only way to leave the checks out")]
+        let shader = unsafe { device.create_shader_module_trusted(descriptor, checks) };
         let kind = match target {
             None => PipelineKind::Compute(device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
                 label: Some(&label),

@@ -171,7 +171,7 @@ impl BoundKernels {
     }
 }
 
-fn workgroups(samples: u32) -> [u32; 2] {
+pub(super) fn workgroups(samples: u32) -> [u32; 2] {
     let groups = samples.div_ceil(WORKGROUP_SIZE).max(1);
     [groups.min(1 << 15), groups.div_ceil(1 << 15)]
 }
@@ -184,8 +184,13 @@ pub(super) fn trace_groups(
     batch: [&wgpu::Buffer; 4],
 ) -> [Option<wgpu::BindGroup>; 2] {
     let first: Vec<_> = (0..).zip(batch.map(wgpu::Buffer::as_entire_binding)).collect();
+    [kernel.bind(device, 0, &first), scene_group(device, kernel, scene)]
+}
+
+/// Group 1 of a kernel that reads the scene.
+pub(super) fn scene_group(device: &wgpu::Device, kernel: &Pipeline, scene: &SceneOnGpu) -> Option<wgpu::BindGroup> {
     let buffers = scene.bindings.buffers.iter().map(wgpu::Buffer::as_entire_binding);
     let textures = scene.bindings.textures.iter().map(wgpu::BindingResource::TextureView);
-    let second: Vec<_> = (0..).zip(buffers.chain(textures)).collect();
-    [kernel.bind(device, 0, &first), kernel.bind(device, 1, &second)]
+    let resources: Vec<_> = (0..).zip(buffers.chain(textures)).collect();
+    kernel.bind(device, 1, &resources)
 }
