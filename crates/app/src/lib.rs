@@ -12,6 +12,7 @@ pub mod gaze;
 pub mod output;
 pub mod preview;
 pub mod readback;
+pub mod reload;
 pub mod sampling;
 pub mod screen;
 pub mod session;

@@ -4,6 +4,7 @@
 //! point in f64, so that geometry far from the file's origin keeps its precision in f32.
 //! Radiance is linear Rec. 709; punctual lights are in glTF's units (candela, lux) with 1:1 radiometry.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::{Affine3A, DVec3, Quat, Vec2, Vec3, Vec4};
@@ -58,6 +59,39 @@ impl Scene {
         let (low, high) =
             corners.flatten().fold((Vec3::MAX, Vec3::MIN), |(low, high), point| (low.min(point), high.max(point)));
         (low.x <= high.x).then_some((low, high))
+    }
+
+    /// This version with every part that `last` holds in equal form taken from it, so that equal parts are one in memory
+    /// and are recognised by their address.
+    #[must_use]
+    pub fn sharing_parts_of(mut self, last: &Self) -> Self {
+        let meshes: HashMap<_, _> = last.meshes.iter().map(|mesh| ((mesh.hash, &mesh.name), mesh)).collect();
+        for mesh in &mut self.meshes {
+            if let Some(&known) = meshes.get(&(mesh.hash, &mesh.name)) {
+                *mesh = Arc::clone(known);
+            }
+        }
+        let textures: HashMap<_, _> = last.textures.iter().map(|part| ((part.hash, &part.name), part)).collect();
+        for texture in &mut self.textures {
+            if let Some(&known) = textures.get(&(texture.hash, &texture.name)) {
+                *texture = Arc::clone(known);
+            }
+        }
+        let materials: HashMap<_, _> = last.materials.iter().map(|part| (&part.name, part)).collect();
+        for material in &mut self.materials {
+            if let Some(&known) = materials.get(&material.name)
+                && known == material
+            {
+                *material = Arc::clone(known);
+            }
+        }
+        if let (Environment::Image { image, .. }, Environment::Image { image: known, .. }) =
+            (&mut self.environment, &last.environment)
+            && image.hash == known.hash
+        {
+            *image = Arc::clone(known);
+        }
+        self
     }
 }
 

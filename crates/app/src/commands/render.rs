@@ -43,7 +43,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     check_writable(&args.output)?;
     let source = Source::from(args.scene.scene.as_deref());
     let import_start = Instant::now();
-    let Loaded { scene, notes } = session::load(&source, &args.scene)?;
+    let Loaded { scene, notes, .. } = session::load(&source, &args.scene)?;
     let import_seconds = import_start.elapsed().as_secs_f64();
     for note in &notes {
         eprintln!("note: {note}");
