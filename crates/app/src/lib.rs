@@ -7,6 +7,7 @@
 
 pub mod cli;
 pub mod commands;
+pub mod document;
 pub mod film;
 pub mod gaze;
 pub mod output;

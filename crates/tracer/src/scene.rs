@@ -65,26 +65,9 @@ impl Scene {
     /// and are recognised by their address.
     #[must_use]
     pub fn sharing_parts_of(mut self, last: &Self) -> Self {
-        let meshes: HashMap<_, _> = last.meshes.iter().map(|mesh| ((mesh.hash, &mesh.name), mesh)).collect();
-        for mesh in &mut self.meshes {
-            if let Some(&known) = meshes.get(&(mesh.hash, &mesh.name)) {
-                *mesh = Arc::clone(known);
-            }
-        }
-        let textures: HashMap<_, _> = last.textures.iter().map(|part| ((part.hash, &part.name), part)).collect();
-        for texture in &mut self.textures {
-            if let Some(&known) = textures.get(&(texture.hash, &texture.name)) {
-                *texture = Arc::clone(known);
-            }
-        }
-        let materials: HashMap<_, _> = last.materials.iter().map(|part| (&part.name, part)).collect();
-        for material in &mut self.materials {
-            if let Some(&known) = materials.get(&material.name)
-                && known == material
-            {
-                *material = Arc::clone(known);
-            }
-        }
+        share(&mut self.meshes, &last.meshes, |mesh| &mesh.name, |a, b| a.hash == b.hash && a.name == b.name);
+        share(&mut self.textures, &last.textures, |part| &part.name, |a, b| a.hash == b.hash && a.name == b.name);
+        share(&mut self.materials, &last.materials, |material| &material.name, Material::eq);
         if let (Environment::Image { image, .. }, Environment::Image { image: known, .. }) =
             (&mut self.environment, &last.environment)
             && image.hash == known.hash
@@ -92,6 +75,17 @@ impl Scene {
             *image = Arc::clone(known);
         }
         self
+    }
+}
+
+/// Replaces parts by equal ones of `known`: the one at the same place if it is equal, else one of the same name.
+fn share<T>(parts: &mut [Arc<T>], known: &[Arc<T>], name: impl Fn(&T) -> &str, equal: impl Fn(&T, &T) -> bool) {
+    let by_name: HashMap<&str, &Arc<T>> = known.iter().map(|part| (name(part), part)).collect();
+    for (index, part) in parts.iter_mut().enumerate() {
+        let candidates = known.get(index).into_iter().chain(by_name.get(name(part)).copied());
+        if let Some(same) = candidates.into_iter().find(|candidate| equal(candidate, part)).cloned() {
+            *part = same;
+        }
     }
 }
 
