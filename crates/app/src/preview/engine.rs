@@ -385,7 +385,7 @@ impl Worker {
         let film = self.tracing.film(&shown.look)?;
         let shared = Arc::clone(&self.shared);
         std::thread::Builder::new().name("save".into()).spawn(move || {
-            let message = match exr::write(&path, film) {
+            let message = match exr::write(&path, &film) {
                 Ok(()) => Message::now(format!("saved {}", path.display()), false),
                 Err(error) => Message::now(error.to_string(), true),
             };

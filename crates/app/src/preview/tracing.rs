@@ -243,15 +243,11 @@ impl Tracing {
     pub fn film(&mut self, look: &Look) -> anyhow::Result<FilmFile> {
         let open = self.open.as_ref().context("there is no film yet")?;
         let renderer = open.renderer.as_ref().context("there is no film yet")?;
-        let settings = RunSettings {
-            scene: &open.scene,
-            renderer: renderer.options(),
-            pose: renderer.pose(),
-            mode: look.controls.mode,
-            acuity: look.controls.acuity,
-            samples: renderer.samples(),
-        };
-        Ok(FilmFile::new(&renderer.snapshot()?, settings.to_json()))
+        let aim = self.aim.as_ref().context("there is no film yet")?;
+        let film = renderer.snapshot()?;
+        let acuity = look.controls.acuity;
+        let settings = RunSettings { scene: &open.scene.name, film: &film.header, aim, acuity }.to_json();
+        Ok(FilmFile::new(film, settings))
     }
 
     fn renderer(&mut self) -> anyhow::Result<&mut Renderer> {
