@@ -8,6 +8,7 @@ use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::sampling::Acuity;
 use crate::screen::ScreenGeometry;
+use crate::tev::TevAddress;
 
 pub mod choices;
 pub mod gaze;
@@ -142,6 +143,9 @@ pub struct RenderArgs {
     /// How radiance becomes a PNG.
     #[command(flatten)]
     pub picture: PictureArgs,
+    /// Send the film to the image viewer tev as it converges
+    #[arg(long, value_name = "HOST:PORT")]
+    pub tev: Option<TevAddress>,
     /// Print one JSON object about the run on standard output
     #[arg(long)]
     pub json: bool,

@@ -18,6 +18,7 @@ pub mod sampling;
 pub mod screen;
 pub mod session;
 pub mod settings;
+pub mod tev;
 pub mod view;
 
 /// The README's example compiles.

@@ -8,6 +8,8 @@ use support::{Folder, SQUARE, fovea, json, refuses, text};
 use tracer::film::FilmPixel;
 
 mod support;
+#[path = "films/tev.rs"]
+mod tev;
 
 /// The square with a camera that is turned, so that the film's orientation shows.
 fn scene(folder: &Folder) -> PathBuf {

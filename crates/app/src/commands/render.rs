@@ -25,6 +25,7 @@ use crate::readback;
 use crate::sampling::{Aim, GazePoint};
 use crate::session::{self, Loaded, Source, Viewpoint};
 use crate::settings::RunSettings;
+use crate::tev::{TevLink, TevPicture};
 use crate::view::direction;
 use follow::Step;
 
@@ -81,11 +82,12 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         dump_kernels(&renderer, folder)?;
     }
 
+    let mut tev = tev(args)?;
     let seconds = if steps.is_empty() {
-        trace(&mut renderer, stop(&args.stop, &film))?
+        trace(&mut renderer, stop(&args.stop, &film), tev.as_mut())?
     } else {
         let at = |gaze| Aim { gaze, ..aim }.distribution(&film, pose.world_from_film, &inverse);
-        trace_steps(&mut renderer, &steps, at)?
+        trace_steps(&mut renderer, &steps, at, tev.as_mut())?
     };
     let header = renderer.film_header()?;
     let run = RunSettings { scene: &scene.name, film: &header, aim: &aim, acuity: args.sampling.acuity() };
@@ -109,6 +111,13 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         return print_json(&run.to_json(&gpu, &scene, &film, &settings));
     }
     Ok(())
+}
+
+/// The link to a viewer, when one is asked for; the picture is called as the output.
+fn tev(args: &RenderArgs) -> anyhow::Result<Option<TevLink>> {
+    let Some(address) = &args.tev else { return Ok(None) };
+    let name = args.output.file_name().unwrap_or_default().to_string_lossy();
+    Ok(Some(TevLink::start(address.clone(), &name, |line| eprintln!("note: {line}"))?))
 }
 
 /// Options and pose of a render that starts with an empty film.
@@ -210,6 +219,7 @@ fn trace_steps(
     renderer: &mut Renderer,
     steps: &[Step],
     distribution: impl Fn(GazePoint) -> Distribution,
+    mut tev: Option<&mut TevLink>,
 ) -> anyhow::Result<f64> {
     let bar = progress_bar()?;
     let total = steps.last().map_or(1, |step| step.samples.max(1));
@@ -218,20 +228,45 @@ fn trace_steps(
         renderer.set_distribution(distribution(step.gaze))?;
         seconds += renderer.render(StopCondition::Samples(step.samples), |_| true)?;
         bar.set_position((step.samples as f64 / total as f64 * BAR_STEPS as f64) as u64);
+        if let Some(tev) = tev.as_deref_mut()
+            && (step.samples == total || tev.is_due())
+        {
+            push(renderer, tev)?;
+        }
     }
     bar.finish_and_clear();
     Ok(seconds)
 }
 
-/// Traces with a progress bar on a terminal; returns the seconds of tracing.
-fn trace(renderer: &mut Renderer, stop: StopCondition) -> anyhow::Result<f64> {
+/// Traces with a progress bar on a terminal, and pictures for a viewer; returns the seconds of tracing.
+fn trace(renderer: &mut Renderer, stop: StopCondition, mut tev: Option<&mut TevLink>) -> anyhow::Result<f64> {
     let bar = progress_bar()?;
-    let outcome = renderer.render(stop, |fraction| {
-        bar.set_position((fraction * BAR_STEPS as f64) as u64);
-        true
-    });
-    bar.finish_and_clear();
-    Ok(outcome?)
+    let mut seconds = 0.0;
+    loop {
+        let (rest, done) = match stop {
+            StopCondition::Seconds(total) => (StopCondition::Seconds(total - seconds), seconds / total),
+            samples => (samples, 0.0),
+        };
+        let mut interrupted = false;
+        seconds += renderer.render(rest, |fraction| {
+            let fraction = done + (1.0 - done) * fraction;
+            bar.set_position((fraction * BAR_STEPS as f64) as u64);
+            interrupted = fraction < 1.0 && tev.as_deref().is_some_and(TevLink::is_due);
+            !interrupted
+        })?;
+        if let Some(tev) = tev.as_deref_mut() {
+            push(renderer, tev)?;
+        }
+        if !interrupted {
+            bar.finish_and_clear();
+            return Ok(seconds);
+        }
+    }
+}
+
+fn push(renderer: &Renderer, tev: &mut TevLink) -> anyhow::Result<()> {
+    tev.push(|| renderer.snapshot().map(|film| TevPicture::from(&film)))?;
+    Ok(())
 }
 
 fn whole_film(args: &RenderArgs, film: &FilmOptions) -> ViewSettings {

@@ -62,7 +62,8 @@ pub fn from_json(settings: &Value) -> Result<FilmHeader, String> {
     };
     let ranges = settings["ranges"].as_array().ok_or_else(|| bad("ranges"))?;
     let ranges: Vec<SampleRange> = ranges.iter().map(range).collect::<Result<_, String>>()?;
-    let scale = |name: &str| settings[name].as_f64().filter(|scale| scale.is_normal() && *scale > 0.0).ok_or_else(|| bad(name));
+    let scale =
+        |name: &str| settings[name].as_f64().filter(|scale| scale.is_normal() && *scale > 0.0).ok_or_else(|| bad(name));
     let sequence = SEQUENCES.iter().find(|entry| settings["sequence"] == entry.1).ok_or_else(|| bad("sequence"))?.0;
     let scene = settings["scene_hash"].as_str().and_then(|text| ContentHash::from_str(text).ok());
     let mut header = FilmHeader {
