@@ -3,10 +3,12 @@
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand};
+use clap::parser::ValueSource;
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::sampling::Acuity;
 use crate::screen::ScreenGeometry;
+use crate::tev::TevAddress;
 
 pub mod choices;
 pub mod gaze;
@@ -35,6 +37,8 @@ pub struct Cli {
 pub enum Command {
     /// Render without a window to an EXR or PNG file
     Render(Box<RenderArgs>),
+    /// Add films of one scene that were rendered apart
+    Merge(MergeArgs),
     /// Say what a scene holds and what of it is not supported
     Info(InfoArgs),
     /// List the graphics adapters and which one would be used
@@ -66,6 +70,9 @@ pub struct PreviewArgs {
     /// Where the gaze comes from.
     #[command(flatten)]
     pub gaze: PreviewGazeArgs,
+    /// Go on with a film of this scene that fovea wrote, from where it was taken
+    #[arg(long, value_name = "FILM.exr")]
+    pub resume: Option<PathBuf>,
     /// The window's size when it opens, pixels
     #[arg(long, default_value = "1280x720", value_name = "WxH")]
     pub window: SizePx,
@@ -117,18 +124,48 @@ pub struct RenderArgs {
     /// Where eccentricity is measured: in the scene, or at the eye before a screen that shows the view
     #[arg(long, value_enum, default_value_t = EccentricityAt::Scene, value_name = "PLACE")]
     pub eccentricity: EccentricityAt,
+    /// Go on with a film that fovea wrote: what it is of (--film, --seed, --max-bounces, place) comes from there, and
+    /// --samples and --spp count what it holds already
+    #[arg(long, value_name = "FILM.exr")]
+    pub resume: Option<PathBuf>,
+    /// Index of the first sample: ranges of one seed that are rendered apart add up to one render (`fovea merge`)
+    #[arg(
+        long, allow_negative_numbers = true, default_value_t = 0, conflicts_with = "resume",
+        value_parser = clap::value_parser!(u64).range(0..=1 << 61), value_name = "N"
+    )]
+    pub first_sample: u64,
+    /// Those of [`FILM_OPTIONS`] that were asked for, rather than left at their defaults.
+    #[arg(skip)]
+    pub stated: Vec<&'static str>,
     /// When to stop.
     #[command(flatten)]
     pub stop: StopArgs,
     /// How radiance becomes a PNG.
     #[command(flatten)]
     pub picture: PictureArgs,
+    /// Send the film to the image viewer tev as it converges
+    #[arg(long, value_name = "HOST:PORT")]
+    pub tev: Option<TevAddress>,
     /// Print one JSON object about the run on standard output
     #[arg(long)]
     pub json: bool,
     /// Write the shaders that ran, one WGSL file a kernel, into this folder
     #[arg(long, value_name = "DIR")]
     pub dump_kernels: Option<PathBuf>,
+}
+
+/// Options of `fovea render` that say what a film is of, by their field's name: a film that is resumed has them already.
+pub const FILM_OPTIONS: [&str; 6] = ["film", "camera", "orient", "seed", "sequence", "max_bounces"];
+
+/// `fovea merge`.
+#[derive(Clone, Debug, Args)]
+pub struct MergeArgs {
+    /// Films that fovea wrote, of disjoint ranges of samples (--first-sample) or of different seeds
+    #[arg(required = true, value_name = "FILM.exr")]
+    pub films: Vec<PathBuf>,
+    /// Where their sum goes
+    #[arg(short, long, value_name = "OUT.exr")]
+    pub output: PathBuf,
 }
 
 /// `fovea info`.
@@ -280,10 +317,10 @@ pub struct PictureArgs {
 #[derive(Clone, Copy, Debug, Args)]
 #[group(multiple = false)]
 pub struct StopArgs {
-    /// Stop after this many samples
+    /// Stop when the film has this many samples
     #[arg(long, allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..), value_name = "N")]
     pub samples: Option<u64>,
-    /// Stop after this many samples times the film's pixels, wherever they fall [default: 16]
+    /// Stop when the film has this many samples times its pixels, wherever they fall [default: 16]
     #[arg(
         long, allow_negative_numbers = true,
         value_parser = clap::value_parser!(u64).range(1..=1 << 32), value_name = "N"
@@ -305,10 +342,21 @@ pub enum Stop {
 
 /// Reads a command line, the program's name first.
 pub fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Cli, Stop> {
-    Cli::try_parse_from(arguments).map_err(|error| {
+    try_parse(arguments).map_err(|error| {
         let text = error.render().to_string();
         if error.use_stderr() { Stop::Wrong(one_line(&text)) } else { Stop::Asked(text) }
     })
+}
+
+fn try_parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Cli, clap::Error> {
+    let mut command = Cli::command();
+    let matches = command.try_get_matches_from_mut(arguments)?;
+    let mut cli = Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
+    if let (Some(Command::Render(args)), Some(matches)) = (&mut cli.command, matches.subcommand_matches("render")) {
+        let stated = |id: &&str| matches.value_source(id) == Some(ValueSource::CommandLine);
+        args.stated = FILM_OPTIONS.into_iter().filter(stated).collect();
+    }
+    Ok(cli)
 }
 
 /// The first paragraph of clap's message, as one line without its `error: `.

@@ -10,6 +10,7 @@ use crate::cli::{Cli, Command};
 pub mod adapters;
 pub mod gaze;
 pub mod info;
+pub mod merge;
 pub mod render;
 pub mod sampler;
 
@@ -21,6 +22,7 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
     match cli.command {
         None => crate::preview::run(cli.preview),
         Some(Command::Render(args)) => render::run(&args),
+        Some(Command::Merge(args)) => merge::run(&args),
         Some(Command::Info(args)) => info::run(&args),
         Some(Command::Adapters(args)) => adapters::run(&args),
         Some(Command::Gaze(args)) => gaze::run(&args),

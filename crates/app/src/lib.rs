@@ -7,15 +7,18 @@
 
 pub mod cli;
 pub mod commands;
+pub mod document;
 pub mod film;
 pub mod gaze;
 pub mod output;
 pub mod preview;
 pub mod readback;
+pub mod reload;
 pub mod sampling;
 pub mod screen;
 pub mod session;
 pub mod settings;
+pub mod tev;
 pub mod view;
 
 /// The README's example compiles.

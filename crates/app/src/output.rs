@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 pub mod exr;
+pub mod header;
 pub mod png;
 
 /// Why an image file could not be written or read. `Display` is one line that names the file.

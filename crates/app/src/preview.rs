@@ -9,9 +9,10 @@ use tracer::gpu::{AdapterSelect, Gpu};
 use crate::cli::PreviewArgs;
 use crate::commands::print_json;
 use crate::gaze::hub::GazeHub;
+use crate::reload::Loader;
+use crate::reload::rule::Timing;
 use crate::session::{self, Source};
-use controls::Controls;
-use engine::{Engine, Request};
+use engine::Engine;
 use gaze_control::GazeControl;
 use screenshot::{Outcome, Screenshot};
 use window::Window;
@@ -22,6 +23,7 @@ pub mod gaze;
 pub mod gaze_control;
 pub mod gaze_panel;
 pub mod navigation;
+pub mod open_scene;
 pub mod overlay;
 pub mod pacing;
 pub mod screenshot;
@@ -64,9 +66,11 @@ pub fn run(args: PreviewArgs) -> anyhow::Result<()> {
         let adapter = gpu.info().name.clone();
         let ctx = creation.egui_ctx.clone();
         let engine = Engine::start(gpu, &args, Arc::clone(&gaze), move || ctx.request_repaint())?;
-        engine.request(Request::Open(source));
+        let ctx = creation.egui_ctx.clone();
+        let loader = Loader::start(args.scene.clone(), Timing::default(), move || ctx.request_repaint())?;
+        loader.open(source);
         let gaze = GazeControl::new(gaze, &args);
-        Ok(Box::new(Window::new(engine, adapter, Controls::from(&args), gaze, screenshot)))
+        Ok(Box::new(Window::new(engine, loader, adapter, &args, gaze, screenshot)))
     });
     eframe::run_native("fovea", options, creator).map_err(explain)?;
     let outcome = outcome.lock().unwrap_or_else(PoisonError::into_inner).take();

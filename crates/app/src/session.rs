@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, bail};
 use glam::{Quat, Vec3};
-use tracer::import::{ImportOptions, ImportReport, ImportWarning};
+use tracer::import::{ImportOptions, ImportReport, ImportWarning, SceneNode};
 use tracer::scene::{Environment, Projection, PunctualKind, Scene};
 
 use crate::cli::values::CameraChoice;
@@ -61,6 +61,12 @@ pub struct Loaded {
     pub scene: Arc<Scene>,
     /// What was not supported, repaired or replaced, one line each.
     pub notes: Vec<String>,
+    /// The file's nodes, which make the scene's tree; instances refer to them.
+    pub nodes: Vec<SceneNode>,
+    /// All files that were read, the scene's own first.
+    pub files: Vec<PathBuf>,
+    /// Images that did not decode, one line each: they may be half written.
+    pub replaced_images: Vec<String>,
 }
 
 /// Loads a scene and puts the environment that was asked for around it.
@@ -96,8 +102,11 @@ pub fn load(source: &Source, args: &SceneArgs) -> anyhow::Result<Loaded> {
             *angular_diameter = args.sun_angle.to_radians();
         }
     }
+    let is_replaced = |warning: &&ImportWarning| matches!(warning, ImportWarning::ImageReplaced { .. });
+    let replaced_images = warnings.iter().filter(is_replaced).map(ToString::to_string).collect();
     let notes = warnings.iter().map(ToString::to_string).chain(repaired).collect();
-    Ok(Loaded { scene: Arc::new(scene), notes })
+    let files = report.files.into_iter().chain(args.env.clone()).collect();
+    Ok(Loaded { scene: Arc::new(scene), notes, nodes: report.nodes, files, replaced_images })
 }
 
 /// Reads a scene as it is.

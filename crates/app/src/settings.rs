@@ -1,59 +1,57 @@
 //! How a film was made, as the header of an EXR file and `--json` say it.
 
-use serde_json::{Value, json};
-use tracer::film::FilmMapping;
-use tracer::renderer::{FilmPose, RendererOptions, SequenceKind};
-use tracer::scene::Scene;
+use serde_json::{Map, Value, json};
+use tracer::film::FilmHeader;
+use tracer::renderer::SequenceKind;
 
-use crate::cli::choices::{Geometry, InverseForm, Mode, Sequence, ToneMapping};
-use crate::sampling::Acuity;
+use crate::cli::choices::{Clip, EccentricityAt, Geometry, InverseForm, Mode, Sequence, ToneMapping};
+use crate::output::header;
+use crate::sampling::{Acuity, Aim};
 
 /// What decides a film's content.
 #[derive(Clone, Copy, Debug)]
 pub struct RunSettings<'a> {
-    /// The scene.
-    pub scene: &'a Scene,
-    /// Film, bounces, seed and sequence.
-    pub renderer: &'a RendererOptions,
-    /// Where the film stands and looks.
-    pub pose: FilmPose,
-    /// The last mode; a window may have mixed several.
-    pub mode: Mode,
+    /// What a person calls the scene.
+    pub scene: &'a str,
+    /// What the film is of.
+    pub film: &'a FilmHeader,
+    /// Where the last samples went; a window may have looked elsewhere before.
+    pub aim: &'a Aim,
     /// What the foveated mode went by.
     pub acuity: Acuity,
-    /// Samples in the film.
-    pub samples: u64,
 }
 
 impl RunSettings<'_> {
     /// The settings as one JSON object.
-    pub fn to_json(&self) -> Value {
-        let film = &self.renderer.film;
-        let mapping = match film.mapping {
-            FilmMapping::Equirect => json!({ "kind": "equirect" }),
-            FilmMapping::Perspective { half_extent } => json!({ "kind": "perspective", "half_extent": half_extent }),
-        };
-        json!({
-            "scene": self.scene.name,
-            "scene_hash": self.scene.content_hash().to_string(),
-            "seed": self.renderer.seed,
-            "first_sample": 0,
-            "samples": self.samples,
-            "sequence": match self.renderer.sequence {
-                SequenceKind::Sobol => "sobol",
-                SequenceKind::Independent => "independent",
-            },
-            "max_bounces": self.renderer.max_bounces,
-            "mode": mode_name(self.mode),
-            "model": self.acuity.model.sampler_name(),
-            "geometry": match self.acuity.geometry {
+    pub fn to_json(&self) -> Map<String, Value> {
+        let (aim, acuity) = (self.aim, self.acuity);
+        let view = aim.view;
+        let mut fields = header::to_json(self.film);
+        let own = json!({
+            "scene": self.scene,
+            "mode": mode_name(aim.mode),
+            "model": acuity.model.sampler_name(),
+            "geometry": match acuity.geometry {
                 Geometry::Sphere => "sphere",
                 Geometry::Plane => "plane",
             },
-            "film": { "width": film.width, "height": film.height, "mapping": mapping },
-            "position_m": self.pose.position.to_array(),
-            "world_from_film_xyzw": self.pose.world_from_film.to_array(),
-        })
+            "inverse": acuity.inverse.map(InverseForm::name),
+            "floor": acuity.floor,
+            "gaze": aim.gaze.direction.to_array(),
+            "view": { "world_from_view_xyzw": view.world_from_view.to_array(), "half_extent": view.half_extent.to_array() },
+            "clip": match aim.clip {
+                Clip::None => "none",
+                Clip::View => "view",
+            },
+            "eccentricity": match aim.eccentricity {
+                EccentricityAt::Scene => "scene",
+                EccentricityAt::Eye => "eye",
+            },
+        });
+        if let Value::Object(own) = own {
+            fields.extend(own);
+        }
+        fields
     }
 }
 

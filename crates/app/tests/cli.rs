@@ -2,87 +2,12 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
-use fovea_app::output::exr;
-use serde_json::Value;
+use fovea_app::output::exr::{self, FilmFile};
+use support::{Folder, SQUARE, fovea, json, refuses, text};
 
-/// A folder of its own for a test, with a glTF scene of one square; removed when dropped.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(test: &str) -> Self {
-        let folder = std::env::temp_dir().join(format!("fovea-cli-{test}-{}", std::process::id()));
-        let _ = std::fs::remove_dir_all(&folder);
-        std::fs::create_dir_all(&folder).unwrap();
-        let corners: [[f32; 3]; 4] = [[-1.0, -1.0, -2.0], [1.0, -1.0, -2.0], [1.0, 1.0, -2.0], [-1.0, 1.0, -2.0]];
-        let mut bytes: Vec<u8> = corners.iter().flatten().flat_map(|value| value.to_le_bytes()).collect();
-        bytes.extend([0_u16, 1, 2, 0, 2, 3].iter().flat_map(|index| index.to_le_bytes()));
-        std::fs::write(folder.join("a square.bin"), bytes).unwrap();
-        std::fs::write(folder.join("square.gltf"), SQUARE).unwrap();
-        Self(folder)
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.join(name)
-    }
-
-    fn names(&self) -> Vec<String> {
-        let entries = std::fs::read_dir(&self.0).unwrap();
-        let mut names: Vec<_> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-        names.sort();
-        names
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        // What a failed test leaves in the folder for temporary files harms nothing.
-        let _ = std::fs::remove_dir_all(&self.0);
-    }
-}
-
-/// A square of 2 m, 2 m before a camera that stands at the origin.
-const SQUARE: &str = r#"{
-    "asset": { "version": "2.0" }, "scene": 0, "scenes": [{ "nodes": [0, 1] }],
-    "nodes": [{ "mesh": 0 }, { "camera": 0, "name": "eye" }],
-    "cameras": [{ "type": "perspective", "perspective": { "yfov": 0.8, "znear": 0.1 } }],
-    "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "indices": 1 }] }],
-    "buffers": [{ "uri": "a%20square.bin", "byteLength": 60 }],
-    "bufferViews": [{ "buffer": 0, "byteLength": 48 }, { "buffer": 0, "byteOffset": 48, "byteLength": 12 }],
-    "accessors": [
-        { "bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", "min": [-1, -1, -2], "max": [1, 1, -2] },
-        { "bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR" }
-    ]
-}"#;
-
-fn fovea(arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_fovea")).args(arguments).output().unwrap()
-}
-
-fn text(path: &Path) -> &str {
-    path.to_str().unwrap()
-}
-
-/// One line on standard error that has all of `parts`, nothing on standard output, exit status 2.
-fn refuses(arguments: &[&str], parts: &[&str]) {
-    let output = fovea(arguments);
-    let message = String::from_utf8(output.stderr).unwrap();
-    let lines: Vec<&str> = message.lines().filter(|line| line.starts_with("error: ")).collect();
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-    assert_eq!(lines.len(), 1, "{arguments:?}: {message}");
-    assert!(message.trim_end().ends_with(lines[0]), "nothing follows the error: {message}");
-    for part in parts {
-        assert!(lines[0].contains(part), "{arguments:?}: {message}");
-    }
-    assert!(output.stdout.is_empty(), "{arguments:?}");
-}
-
-fn json(arguments: &[&str]) -> Value {
-    let output = fovea(arguments);
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).unwrap()
-}
+mod support;
 
 #[test]
 fn bad_input_is_refused_in_one_line_and_no_file_is_touched() {
@@ -130,15 +55,15 @@ fn an_exr_holds_every_sample_and_the_same_command_gives_the_same_bytes() {
         [&["render", text(&scene), "-o", out], film.as_slice()].concat()
     };
     let report = json(&arguments(text(&first)));
-    let film = exr::read(&first).unwrap();
-    assert_eq!((film.width, film.height), (64, 32));
-    assert_eq!(film.samples.iter().map(|&count| u64::from(count)).sum::<u64>(), 20_000);
-    assert_eq!(film.settings["seed"], 5);
-    assert_eq!(film.settings["samples"], 20_000);
-    assert_eq!(film.settings["scene"], "square.gltf");
-    assert!(film.rgb.iter().flatten().all(|value| value.is_finite() && *value >= 0.0));
+    let FilmFile { film, settings } = exr::read(&first).unwrap();
+    assert_eq!((film.header.options.width, film.header.options.height), (64, 32));
+    let pixels: Vec<_> = film.pixels().collect();
+    assert_eq!(pixels.iter().map(|pixel| u64::from(pixel.samples)).sum::<u64>(), 20_000);
+    assert_eq!((settings["seed"].as_u64(), settings["samples"].as_u64()), (Some(5), Some(20_000)));
+    assert_eq!(settings["scene"], "square.gltf");
+    assert!(pixels.iter().flat_map(|pixel| pixel.mean).all(|value| value.is_finite() && value >= 0.0));
     // The gaze is the centre: the pixel there has many times the samples of the one behind.
-    let count = |x: usize, y: usize| film.samples[y * 64 + x];
+    let count = |x: usize, y: usize| pixels[y * 64 + x].samples;
     assert!(count(32, 16) > 20 * count(0, 16).max(1), "{} {}", count(32, 16), count(0, 16));
 
     for key in ["adapter", "driver", "scene", "mode", "samples", "seconds", "samples_per_s", "segments_per_s"] {
@@ -177,13 +102,13 @@ fn a_render_follows_a_recorded_gaze_and_is_the_same_every_time() {
     let (first, second) = (folder.path("1.exr"), folder.path("2.exr"));
     let report = render(text(&first));
     assert_eq!((report["samples"].as_u64(), report["gaze_trace"].as_str()), (Some(60_000), Some("gaze.csv")));
-    let film = exr::read(&first).unwrap();
-    assert_eq!(film.settings["gaze_trace"], "gaze.csv");
+    let FilmFile { film, settings } = exr::read(&first).unwrap();
+    assert_eq!(settings["gaze_trace"], "gaze.csv");
     // 45 degrees are 8 of 64 columns.
     let about = |column: usize| -> f64 {
         (12..20)
             .flat_map(|y| (column - 3..column + 3).map(move |x| (x, y)))
-            .map(|(x, y)| f64::from(film.samples[y * 64 + x]))
+            .map(|(x, y)| f64::from(film.pixel(y * 64 + x).samples))
             .sum()
     };
     let (left, centre, right) = (about(24), about(32), about(40));

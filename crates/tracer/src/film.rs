@@ -9,9 +9,11 @@ use crate::{
     kernels::{FILM_WORDS, layout::FilmCounters},
 };
 
+mod merge;
 mod probe;
 mod snapshot;
 
+pub use merge::MergeError;
 pub use snapshot::{DamagedFilm, FilmDifference, FilmHeader, FilmPixel, FilmSnapshot, SampleRange};
 pub(crate) use snapshot::{LAST_SAMPLE, joined};
 

@@ -43,7 +43,7 @@ mod texture;
 
 pub use assemble::REBASE_RATIO;
 pub use error::{ContentError, ImportError};
-pub use report::{ImportReport, ImportSeconds, ImportWarning};
+pub use report::{ImportReport, ImportSeconds, ImportWarning, SceneNode};
 
 use accessor::Data;
 use container::{Container, Folder};

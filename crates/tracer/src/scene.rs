@@ -4,6 +4,7 @@
 //! point in f64, so that geometry far from the file's origin keeps its precision in f32.
 //! Radiance is linear Rec. 709; punctual lights are in glTF's units (candela, lux) with 1:1 radiometry.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::{Affine3A, DVec3, Quat, Vec2, Vec3, Vec4};
@@ -58,6 +59,33 @@ impl Scene {
         let (low, high) =
             corners.flatten().fold((Vec3::MAX, Vec3::MIN), |(low, high), point| (low.min(point), high.max(point)));
         (low.x <= high.x).then_some((low, high))
+    }
+
+    /// This version with every part that `last` holds in equal form taken from it, so that equal parts are one in memory
+    /// and are recognised by their address.
+    #[must_use]
+    pub fn sharing_parts_of(mut self, last: &Self) -> Self {
+        share(&mut self.meshes, &last.meshes, |mesh| &mesh.name, |a, b| a.hash == b.hash && a.name == b.name);
+        share(&mut self.textures, &last.textures, |part| &part.name, |a, b| a.hash == b.hash && a.name == b.name);
+        share(&mut self.materials, &last.materials, |material| &material.name, Material::eq);
+        if let (Environment::Image { image, .. }, Environment::Image { image: known, .. }) =
+            (&mut self.environment, &last.environment)
+            && image.hash == known.hash
+        {
+            *image = Arc::clone(known);
+        }
+        self
+    }
+}
+
+/// Replaces parts by equal ones of `known`: the one at the same place if it is equal, else one of the same name.
+fn share<T>(parts: &mut [Arc<T>], known: &[Arc<T>], name: impl Fn(&T) -> &str, equal: impl Fn(&T, &T) -> bool) {
+    let by_name: HashMap<&str, &Arc<T>> = known.iter().map(|part| (name(part), part)).collect();
+    for (index, part) in parts.iter_mut().enumerate() {
+        let candidates = known.get(index).into_iter().chain(by_name.get(name(part)).copied());
+        if let Some(same) = candidates.into_iter().find(|candidate| equal(candidate, part)).cloned() {
+            *part = same;
+        }
     }
 }
 

@@ -7,11 +7,12 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, bail};
 use glam::{Quat, Vec2};
 use indicatif::{ProgressBar, ProgressStyle};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use tracer::distribution::{Distribution, View};
 use tracer::film::{FilmMapping, FilmOptions};
 use tracer::gpu::{AdapterSelect, Gpu};
 use tracer::renderer::{FilmPose, RenderStatistics, Renderer, RendererOptions, SceneReport, StopCondition};
+use tracer::scene::Scene;
 use tracer::view::{DebugView, ViewProjection, ViewSettings};
 
 use super::print_json;
@@ -23,11 +24,13 @@ use crate::output::{ImageFormat, check_writable, png};
 use crate::readback;
 use crate::sampling::{Aim, GazePoint};
 use crate::session::{self, Loaded, Source, Viewpoint};
-use crate::settings::{RunSettings, mode_name};
+use crate::settings::RunSettings;
+use crate::tev::{TevLink, TevPicture};
 use crate::view::direction;
 use follow::Step;
 
 mod follow;
+mod resume;
 
 /// Samples a film pixel unless told otherwise.
 const DEFAULT_SPP: u64 = 16;
@@ -43,7 +46,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     check_writable(&args.output)?;
     let source = Source::from(args.scene.scene.as_deref());
     let import_start = Instant::now();
-    let Loaded { scene, notes } = session::load(&source, &args.scene)?;
+    let Loaded { scene, notes, .. } = session::load(&source, &args.scene)?;
     let import_seconds = import_start.elapsed().as_secs_f64();
     for note in &notes {
         eprintln!("note: {note}");
@@ -52,47 +55,51 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     let camera = &viewpoints[session::choose(&viewpoints, args.scene.camera.as_ref())?];
 
     let gpu = Gpu::headless(&args.scene.adapter.clone().map_or(AdapterSelect::Auto, AdapterSelect::Named))?;
-    let film = film_options(args.film, camera);
+    let resumed = args.resume.as_deref().map(exr::read).transpose()?;
+    let (options, pose) = match &resumed {
+        Some(file) => resume::take_over(args, &file.film.header, camera)?,
+        None => fresh(args, camera),
+    };
+    let film = options.film;
     if format == ImageFormat::Png {
         readback::check_size(&gpu, [film.width, film.height])?;
     }
-    let pose = FilmPose { position: camera.position, world_from_film: world_from_film(args, camera) };
     let aim = aim(args, &film, pose.world_from_film)?;
     let steps = match &args.gaze_trace {
         Some(path) => follow::steps(path, args, &aim.view, samples(&args.stop, &film))?,
         None => Vec::new(),
     };
     let inverse = args.sampling.acuity().inverse()?;
-    let options = RendererOptions {
-        film,
-        max_bounces: args.sampling.max_bounces,
-        seed: args.sampling.seed,
-        sequence: args.sampling.sequence.into(),
-    };
     let mut renderer = Renderer::new(&gpu, &options, aim.distribution(&film, pose.world_from_film, &inverse))?;
     let prepared = renderer.set_scene(&scene)?;
     renderer.set_pose(pose);
+    renderer.set_first_sample(args.first_sample);
+    if let (Some(file), Some(path)) = (&resumed, &args.resume) {
+        resume::restore(&mut renderer, file, path)?;
+    }
+    let before = renderer.statistics()?;
     if let Some(folder) = &args.dump_kernels {
         dump_kernels(&renderer, folder)?;
     }
 
+    let mut tev = tev(args)?;
     let seconds = if steps.is_empty() {
-        trace(&mut renderer, stop(&args.stop, &film))?
+        trace(&mut renderer, stop(&args.stop, &film), tev.as_mut())?
     } else {
         let at = |gaze| Aim { gaze, ..aim }.distribution(&film, pose.world_from_film, &inverse);
-        trace_steps(&mut renderer, &steps, at)?
+        trace_steps(&mut renderer, &steps, at, tev.as_mut())?
     };
-    let settings = RunSettings {
-        scene: &scene,
-        renderer: &options,
-        pose,
-        mode: args.sampling.mode,
-        acuity: args.sampling.acuity(),
-        samples: renderer.samples(),
-    };
+    let header = renderer.film_header()?;
+    let run = RunSettings { scene: &scene.name, film: &header, aim: &aim, acuity: args.sampling.acuity() };
+    let settings = with_trace(run.to_json(), args);
     match format {
         ImageFormat::Exr => {
-            exr::write(&args.output, FilmFile::new(&renderer.snapshot()?, with_trace(settings.to_json(), args)))?;
+            let film = renderer.snapshot()?;
+            let file = match resumed {
+                Some(before) => before.gone_on(film, &settings),
+                None => FilmFile::new(film, settings.clone()),
+            };
+            exr::write(&args.output, &file)?;
         }
         ImageFormat::Png => {
             let texels = readback::draw(&mut renderer, &whole_film(args, &film))?;
@@ -100,10 +107,28 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         }
     }
     if args.json {
-        let run = Run { seconds, import_seconds, prepared, statistics: renderer.statistics()? };
-        return print_json(&with_trace(run.to_json(&gpu, &settings), args));
+        let run = Run { seconds, import_seconds, prepared, before, statistics: header.statistics };
+        return print_json(&run.to_json(&gpu, &scene, &film, &settings));
     }
     Ok(())
+}
+
+/// The link to a viewer, when one is asked for; the picture is called as the output.
+fn tev(args: &RenderArgs) -> anyhow::Result<Option<TevLink>> {
+    let Some(address) = &args.tev else { return Ok(None) };
+    let name = args.output.file_name().unwrap_or_default().to_string_lossy();
+    Ok(Some(TevLink::start(address.clone(), &name, |line| eprintln!("note: {line}"))?))
+}
+
+/// Options and pose of a render that starts with an empty film.
+fn fresh(args: &RenderArgs, camera: &Viewpoint) -> (RendererOptions, FilmPose) {
+    let options = RendererOptions {
+        film: film_options(args.film, camera),
+        max_bounces: args.sampling.max_bounces,
+        seed: args.sampling.seed,
+        sequence: args.sampling.sequence.into(),
+    };
+    (options, FilmPose { position: camera.position, world_from_film: world_from_film(args, camera) })
 }
 
 fn film_options(shape: FilmShape, camera: &Viewpoint) -> FilmOptions {
@@ -169,12 +194,12 @@ fn samples(args: &StopArgs, film: &FilmOptions) -> u64 {
     args.samples.unwrap_or_else(|| args.spp.unwrap_or(DEFAULT_SPP).saturating_mul(film.pixels()))
 }
 
-/// What a report says about the recorded gaze that was followed.
-fn with_trace(mut report: Value, args: &RenderArgs) -> Value {
+/// The settings with the recorded gaze that was followed.
+fn with_trace(mut settings: Map<String, Value>, args: &RenderArgs) -> Map<String, Value> {
     if let Some(path) = &args.gaze_trace {
-        report["gaze_trace"] = path.file_name().map(|name| name.to_string_lossy()).into();
+        settings.insert("gaze_trace".into(), path.file_name().map(|name| name.to_string_lossy()).into());
     }
-    report
+    settings
 }
 
 /// Steps of a progress bar.
@@ -194,6 +219,7 @@ fn trace_steps(
     renderer: &mut Renderer,
     steps: &[Step],
     distribution: impl Fn(GazePoint) -> Distribution,
+    mut tev: Option<&mut TevLink>,
 ) -> anyhow::Result<f64> {
     let bar = progress_bar()?;
     let total = steps.last().map_or(1, |step| step.samples.max(1));
@@ -202,20 +228,45 @@ fn trace_steps(
         renderer.set_distribution(distribution(step.gaze))?;
         seconds += renderer.render(StopCondition::Samples(step.samples), |_| true)?;
         bar.set_position((step.samples as f64 / total as f64 * BAR_STEPS as f64) as u64);
+        if let Some(tev) = tev.as_deref_mut()
+            && (step.samples == total || tev.is_due())
+        {
+            push(renderer, tev)?;
+        }
     }
     bar.finish_and_clear();
     Ok(seconds)
 }
 
-/// Traces with a progress bar on a terminal; returns the seconds of tracing.
-fn trace(renderer: &mut Renderer, stop: StopCondition) -> anyhow::Result<f64> {
+/// Traces with a progress bar on a terminal, and pictures for a viewer; returns the seconds of tracing.
+fn trace(renderer: &mut Renderer, stop: StopCondition, mut tev: Option<&mut TevLink>) -> anyhow::Result<f64> {
     let bar = progress_bar()?;
-    let outcome = renderer.render(stop, |fraction| {
-        bar.set_position((fraction * BAR_STEPS as f64) as u64);
-        true
-    });
-    bar.finish_and_clear();
-    Ok(outcome?)
+    let mut seconds = 0.0;
+    loop {
+        let (rest, done) = match stop {
+            StopCondition::Seconds(total) => (StopCondition::Seconds(total - seconds), seconds / total),
+            samples => (samples, 0.0),
+        };
+        let mut interrupted = false;
+        seconds += renderer.render(rest, |fraction| {
+            let fraction = done + (1.0 - done) * fraction;
+            bar.set_position((fraction * BAR_STEPS as f64) as u64);
+            interrupted = fraction < 1.0 && tev.as_deref().is_some_and(TevLink::is_due);
+            !interrupted
+        })?;
+        if let Some(tev) = tev.as_deref_mut() {
+            push(renderer, tev)?;
+        }
+        if !interrupted {
+            bar.finish_and_clear();
+            return Ok(seconds);
+        }
+    }
+}
+
+fn push(renderer: &Renderer, tev: &mut TevLink) -> anyhow::Result<()> {
+    tev.push(|| renderer.snapshot().map(|film| TevPicture::from(&film)))?;
+    Ok(())
 }
 
 fn whole_film(args: &RenderArgs, film: &FilmOptions) -> ViewSettings {
@@ -244,21 +295,24 @@ struct Run {
     seconds: f64,
     import_seconds: f64,
     prepared: SceneReport,
+    /// Of the film that was resumed.
+    before: RenderStatistics,
     statistics: RenderStatistics,
 }
 
 impl Run {
-    fn to_json(&self, gpu: &Gpu, settings: &RunSettings<'_>) -> Value {
+    fn to_json(&self, gpu: &Gpu, scene: &Scene, film: &FilmOptions, settings: &Map<String, Value>) -> Value {
         let info = gpu.info();
-        let statistics = &self.statistics;
-        let per_second = |count: u64| count as f64 / self.seconds.max(1e-9);
+        let (statistics, before) = (&self.statistics, &self.before);
+        let per_second = |now: u64, before: u64| (now - before) as f64 / self.seconds.max(1e-9);
         let samples = statistics.samples;
         json!({
             "adapter": info.name,
             "backend": info.backend.to_string(),
             "driver": format!("{} {}", info.driver, info.driver_info).trim(),
-            "scene": settings.scene.name,
-            "mode": mode_name(settings.mode),
+            "scene": settings.get("scene"),
+            "mode": settings.get("mode"),
+            "gaze_trace": settings.get("gaze_trace"),
             "samples": samples,
             "seconds": self.seconds,
             "stage_seconds": {
@@ -268,17 +322,17 @@ impl Run {
                 "kernel_compile": self.prepared.kernel_compile_secs,
                 "trace": self.seconds,
             },
-            "samples_per_s": per_second(samples),
-            "segments_per_s": per_second(statistics.segments),
-            "shadow_rays_per_s": per_second(statistics.shadow_rays),
+            "samples_per_s": per_second(samples, before.samples),
+            "segments_per_s": per_second(statistics.segments, before.segments),
+            "shadow_rays_per_s": per_second(statistics.shadow_rays, before.shadow_rays),
             "mean_path_length": statistics.segments as f64 / samples.max(1) as f64,
             "non_finite_dropped": statistics.non_finite,
             "clamped": statistics.clamped,
-            "triangles": session::triangles(settings.scene),
+            "triangles": session::triangles(scene),
             "lights": self.prepared.upload.lights,
             "device_bytes": self.prepared.upload.device_bytes,
-            "film_bytes": settings.renderer.film.bytes(),
-            "settings": settings.to_json(),
+            "film_bytes": film.bytes(),
+            "settings": settings,
         })
     }
 }

@@ -1,94 +1,103 @@
-//! OpenEXR files of a film: what a pixel's samples say, unaltered.
+//! OpenEXR files of a film: what a pixel's samples say, and the sums themselves, so that a render can go on.
 //!
-//! Channels: `R`, `G`, `B` (mean radiance, linear Rec. 709, 32-bit float), `variance` (of the mean's luminance, 32-bit
-//! float) and `samples` (32-bit unsigned). A pixel without a sample holds zeros.
+//! Channels for viewers and compositors: `R`, `G`, `B` (mean radiance, linear Rec. 709, 32-bit float), `variance` (of the
+//! mean's luminance, 32-bit float) and `samples` (32-bit unsigned). A pixel without a sample holds zeros.
 //!
-//! The header attribute [`SETTINGS_ATTRIBUTE`] is a JSON object with the seed, the range of samples, the settings and
-//! the scene's hash. It is one attribute because OpenEXR's custom attributes have no order here, and equal films must
-//! give equal bytes.
+//! Channels for resuming and merging, 32-bit unsigned: `sum.R.0`, `sum.R.1` and so on are the words of the film's integer
+//! sums in quanta, the lowest first; `sum.squares.0` to `.2` those of squared luminance. They are lossless; the floats are
+//! what follows from them.
+//!
+//! The header attribute [`SETTINGS_ATTRIBUTE`] is a JSON object with the ranges of samples, the settings and the scene's
+//! hash. It is one attribute because OpenEXR's custom attributes have no order here, and equal films must give equal bytes.
 
 use std::path::Path;
 
 use ::exr::prelude::*;
-use serde_json::Value;
-use tracer::film::FilmSnapshot;
+use serde_json::{Map, Value};
+use tracer::film::{FilmSnapshot, MergeError};
+use tracer::kernels::FILM_WORDS;
 
-use super::{OutputError, write_atomically};
+use super::{OutputError, header, write_atomically};
 
 /// The header attribute that holds the settings as JSON text.
 pub const SETTINGS_ATTRIBUTE: &str = "fovea";
 
+/// Channels of a film's words, in their order.
+const WORDS: [&str; FILM_WORDS as usize] = [
+    "sum.R.0",
+    "sum.R.1",
+    "sum.G.0",
+    "sum.G.1",
+    "sum.B.0",
+    "sum.B.1",
+    "samples",
+    "sum.squares.0",
+    "sum.squares.1",
+    "sum.squares.2",
+];
+
 /// A film and how it was made.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FilmFile {
-    /// Pixels across.
-    pub width: usize,
-    /// Pixels down.
-    pub height: usize,
-    /// Mean radiance a pixel, row by row from the top; zero without samples.
-    pub rgb: Vec<[f32; 3]>,
-    /// Variance of the mean's luminance; zero below two samples.
-    pub variance: Vec<f32>,
-    /// Samples a pixel.
-    pub samples: Vec<u32>,
-    /// Seed, sample range, settings and scene hash.
-    pub settings: Value,
+    /// The sums, and what they are of.
+    pub film: FilmSnapshot,
+    /// Scene, mode, gaze and what else there is to say, with the film's own fields.
+    pub settings: Map<String, Value>,
 }
 
 impl FilmFile {
-    /// The estimates of a film with the settings that made them.
-    pub fn new(snapshot: &FilmSnapshot, settings: Value) -> Self {
-        let pixels: Vec<_> = snapshot.pixels().collect();
-        Self {
-            width: snapshot.header.options.width as usize,
-            height: snapshot.header.options.height as usize,
-            rgb: pixels.iter().map(|pixel| pixel.mean.map(|component| component as f32)).collect(),
-            variance: pixels.iter().map(|pixel| pixel.variance_of_mean as f32).collect(),
-            samples: pixels.iter().map(|pixel| pixel.samples).collect(),
-            settings,
-        }
+    /// A film with what there is to say about it.
+    pub fn new(film: FilmSnapshot, mut settings: Map<String, Value>) -> Self {
+        settings.extend(header::to_json(&film.header));
+        Self { film, settings }
+    }
+
+    /// This film after more samples, which were placed by these settings.
+    #[must_use]
+    pub fn gone_on(self, film: FilmSnapshot, settings: &Map<String, Value>) -> Self {
+        Self::new(film, header::combined(self.settings, settings))
+    }
+
+    /// Adds the samples of another film of the same picture.
+    ///
+    /// # Errors
+    /// As [`FilmSnapshot::merge`].
+    pub fn merge(&mut self, other: &Self) -> std::result::Result<(), MergeError> {
+        self.film.merge(&other.film)?;
+        self.settings = header::combined(std::mem::take(&mut self.settings), &other.settings);
+        self.settings.extend(header::to_json(&self.film.header));
+        Ok(())
     }
 }
 
 /// Writes a film; an existing file is replaced whole or not at all.
-pub fn write(path: &Path, film: FilmFile) -> std::result::Result<(), OutputError> {
-    let pixels = film.width * film.height;
-    for found in [film.rgb.len(), film.variance.len(), film.samples.len()] {
-        if found != pixels || pixels == 0 {
-            return Err(OutputError::WrongSize {
-                path: path.to_owned(),
-                found,
-                width: film.width,
-                height: film.height,
-            });
-        }
-    }
-    let component = |index: usize| FlatSamples::F32(film.rgb.iter().map(|pixel| pixel[index]).collect());
-    let channels = AnyChannels::sort(
-        [
-            AnyChannel::new("R", component(0)),
-            AnyChannel::new("G", component(1)),
-            AnyChannel::new("B", component(2)),
-            AnyChannel::new("variance", FlatSamples::F32(film.variance)),
-            AnyChannel::new("samples", FlatSamples::U32(film.samples)),
-        ]
-        .into_iter()
-        .collect(),
-    );
+pub fn write(path: &Path, file: &FilmFile) -> std::result::Result<(), OutputError> {
+    let FilmFile { film, settings } = file;
+    let size = (film.header.options.width as usize, film.header.options.height as usize);
+    film.check().map_err(|error| OutputError::Unwritable { path: path.to_owned(), reason: error.to_string() })?;
+    let pixels: Vec<_> = film.pixels().collect();
+    let component = |index: usize| FlatSamples::F32(pixels.iter().map(|pixel| pixel.mean[index] as f32).collect());
+    let variance = FlatSamples::F32(pixels.iter().map(|pixel| pixel.variance_of_mean as f32).collect());
+    let words = WORDS.iter().enumerate().map(|(word, name)| {
+        let values = film.words.iter().skip(word).step_by(WORDS.len()).copied();
+        AnyChannel::new(*name, FlatSamples::U32(values.collect()))
+    });
+    let floats = [("R", component(0)), ("G", component(1)), ("B", component(2)), ("variance", variance)];
+    let floats = floats.into_iter().map(|(name, values)| AnyChannel::new(name, values));
+    let channels = AnyChannels::sort(floats.chain(words).collect());
     let mut attributes = LayerAttributes {
         software_name: Text::new_or_none(concat!("fovea ", env!("CARGO_PKG_VERSION"))),
         ..LayerAttributes::default()
     };
     // Text is bytes to OpenEXR; UTF-8 is what readers expect, and a scene's name may need it.
-    let settings = Text::from_slice_unchecked(film.settings.to_string().as_bytes());
+    let settings = Text::from_slice_unchecked(Value::Object(settings.clone()).to_string().as_bytes());
     attributes.other.insert(Text::from(SETTINGS_ATTRIBUTE), AttributeValue::Text(settings));
     let encoding = Encoding { compression: Compression::ZIP16, ..Encoding::FAST_LOSSLESS };
-    let layer = Layer::new((film.width, film.height), attributes, encoding, channels);
-    let image = Image::from_layer(layer);
+    let image = Image::from_layer(Layer::new(size, attributes, encoding, channels));
     write_atomically(path, |writer| image.write().to_buffered(writer).map_err(|error| error.to_string()))
 }
 
-/// Reads a file that [`write()`] made. Files of other programs are refused with what they lack.
+/// Reads a film that [`write()`] made. Files of other programs are refused with what they lack.
 pub fn read(path: &Path) -> std::result::Result<FilmFile, OutputError> {
     let unreadable = |reason: String| OutputError::Unreadable { path: path.to_owned(), reason };
     let file = std::fs::File::open(path).map_err(|error| unreadable(error.to_string()))?;
@@ -101,48 +110,45 @@ pub fn read(path: &Path) -> std::result::Result<FilmFile, OutputError> {
         .from_buffered(std::io::BufReader::new(file))
         .map_err(|error| unreadable(format!("not a readable OpenEXR file: {error}")))?;
     let layer = image.layer_data;
-    let channel = |name: &str| {
-        let found = layer.channel_data.list.iter().find(|channel| channel.name == *name);
-        found.map(|channel| &channel.sample_data).ok_or_else(|| unreadable(format!("has no channel `{name}`")))
-    };
-    let floats = |name: &str| match channel(name)? {
-        FlatSamples::F32(values) => Ok(values),
-        _ => Err(unreadable(format!("channel `{name}` is not 32-bit float"))),
-    };
-    let (red, green, blue) = (floats("R")?, floats("G")?, floats("B")?);
-    let FlatSamples::U32(samples) = channel("samples")? else {
-        return Err(unreadable("channel `samples` is not 32-bit unsigned".into()));
-    };
-    let settings = match layer.attributes.other.get(&Text::from(SETTINGS_ATTRIBUTE)) {
+    let settings: Map<String, Value> = match layer.attributes.other.get(&Text::from(SETTINGS_ATTRIBUTE)) {
         Some(AttributeValue::Text(text)) => serde_json::from_slice(text.as_slice())
             .map_err(|error| unreadable(format!("header attribute `{SETTINGS_ATTRIBUTE}`: {error}")))?,
-        _ => return Err(unreadable(format!("has no header attribute `{SETTINGS_ATTRIBUTE}`"))),
+        _ => return Err(unreadable(format!("no film of fovea: it has no header attribute `{SETTINGS_ATTRIBUTE}`"))),
     };
-    Ok(FilmFile {
-        width: layer.size.width(),
-        height: layer.size.height(),
-        rgb: red.iter().zip(green).zip(blue).map(|((&r, &g), &b)| [r, g, b]).collect(),
-        variance: floats("variance")?.clone(),
-        samples: samples.clone(),
-        settings,
-    })
+    let header = header::from_json(&Value::Object(settings.clone()))
+        .map_err(|reason| unreadable(format!("header attribute `{SETTINGS_ATTRIBUTE}`: {reason}")))?;
+    let (width, height) = (header.options.width as usize, header.options.height as usize);
+    if (layer.size.width(), layer.size.height()) != (width, height) {
+        let found = (layer.size.width(), layer.size.height());
+        return Err(unreadable(format!("{}x{} pixels for a film of {width}x{height}", found.0, found.1)));
+    }
+    let channel = |name: &&str| {
+        let found = layer.channel_data.list.iter().find(|channel| channel.name == **name);
+        match found.map(|channel| &channel.sample_data) {
+            Some(FlatSamples::U32(values)) => Ok(values),
+            Some(_) => Err(unreadable(format!("channel `{name}` is not 32-bit unsigned"))),
+            None => Err(unreadable(format!("has no channel `{name}`"))),
+        }
+    };
+    let channels: Vec<&Vec<u32>> = WORDS.iter().map(channel).collect::<std::result::Result<_, _>>()?;
+    let words = (0..layer.size.area()).flat_map(|pixel| channels.iter().map(move |values| values[pixel])).collect();
+    let film = FilmSnapshot { header, words };
+    film.check().map_err(|error| unreadable(error.to_string()))?;
+    Ok(FilmFile { film, settings })
 }
 
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
+    use tracer::film::FilmMapping;
+
     use super::*;
 
-    fn film() -> FilmFile {
-        let pixels = 37 * 5;
-        FilmFile {
-            width: 37,
-            height: 5,
-            rgb: (0..pixels).map(|i| [i as f32 * 1e-3, 1e6 / (i + 1) as f32, f32::MIN_POSITIVE]).collect(),
-            variance: (0..pixels).map(|i| (i * i) as f32).collect(),
-            samples: (0..pixels).map(|i| u32::MAX - i as u32).collect(),
-            settings: serde_json::json!({ "seed": 7, "scene": "Kapelle übers Tal 桜.glb", "samples": [0, 12] }),
-        }
+    fn file() -> FilmFile {
+        let header = header::tests::header(FilmMapping::Equirect);
+        let words = (0..37 * 5 * FILM_WORDS).map(|i| i.wrapping_mul(0x9e37_79b9)).collect();
+        let settings = serde_json::json!({ "scene": "Kapelle übers Tal 桜.glb", "gaze": [0.5, 12] });
+        FilmFile::new(FilmSnapshot { header, words }, settings.as_object().unwrap().clone())
     }
 
     fn scratch(name: &str) -> std::path::PathBuf {
@@ -152,8 +158,24 @@ mod tests {
     #[test]
     fn a_film_reads_back_bit_for_bit() {
         let path = scratch("round-trip");
-        write(&path, film()).unwrap();
-        assert_eq!(read(&path).unwrap(), film());
+        write(&path, &file()).unwrap();
+        assert_eq!(read(&path).unwrap(), file());
+        std::fs::remove_file(path).unwrap();
+    }
+
+    #[test]
+    fn other_programs_see_the_mean() {
+        let path = scratch("mean");
+        write(&path, &file()).unwrap();
+        let image = read_first_rgba_layer_from_file(
+            &path,
+            |size, _| vec![[0.0; 3]; size.area()],
+            |pixels: &mut Vec<[f32; 3]>, at, (r, g, b, _): (f32, f32, f32, f32)| {
+                pixels[at.flat_index_for_size(Vec2(37, 5))] = [r, g, b];
+            },
+        );
+        let expected: Vec<_> = file().film.pixels().map(|pixel| pixel.mean.map(|value| value as f32)).collect();
+        assert_eq!(image.unwrap().layer_data.channel_data.pixels, expected);
         std::fs::remove_file(path).unwrap();
     }
 
@@ -161,7 +183,7 @@ mod tests {
     fn equal_films_give_equal_bytes() {
         let paths = [scratch("equal-a"), scratch("equal-b")];
         for path in &paths {
-            write(path, film()).unwrap();
+            write(path, &file()).unwrap();
         }
         assert_eq!(std::fs::read(&paths[0]).unwrap(), std::fs::read(&paths[1]).unwrap());
         paths.iter().for_each(|path| std::fs::remove_file(path).unwrap());
@@ -170,9 +192,9 @@ mod tests {
     #[test]
     fn too_few_pixels_and_foreign_files_are_refused_in_one_line() {
         let path = scratch("refused");
-        let mut short = film();
-        short.variance.pop();
-        assert!(write(&path, short).unwrap_err().to_string().contains("37x5"));
+        let mut short = file();
+        short.film.words.pop();
+        assert!(write(&path, &short).unwrap_err().to_string().contains("37x5"));
         assert!(!path.exists());
 
         std::fs::write(&path, "not an image").unwrap();
@@ -180,7 +202,12 @@ mod tests {
         assert!(message.contains("refused") && !message.contains('\n'), "{message}");
 
         write_rgb_file(&path, 2, 2, |_, _| (0.0_f32, 0.0_f32, 0.0_f32)).unwrap();
-        assert!(read(&path).unwrap_err().to_string().contains("`samples`"));
+        assert!(read(&path).unwrap_err().to_string().contains("no film of fovea"));
+
+        let mut other_size = file();
+        other_size.settings["film"]["width"] = 36.into();
+        write(&path, &other_size).unwrap();
+        assert!(read(&path).unwrap_err().to_string().contains("36x5"));
         std::fs::remove_file(path).unwrap();
     }
 }

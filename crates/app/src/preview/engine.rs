@@ -12,17 +12,18 @@ use std::time::{Duration, Instant};
 use anyhow::Context;
 use glam::UVec2;
 use tracer::gpu::Gpu;
+use tracer::scene::Scene;
 
 use super::controls::{Controls, Readout};
 use super::gaze::{Gaze, ScreenMapping};
 use super::navigation::Standpoint;
 use super::pacing::Pacing;
-use super::tracing::{OpenScene, Tracing};
+use super::tracing::Tracing;
 use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
 use crate::gaze::hub::{GazeHub, SampleTimes};
 use crate::output::exr;
-use crate::session::{Source, one_line};
+use crate::session::one_line;
 
 /// How long a thread with nothing to trace sleeps between looks at what the window wants.
 const IDLE: Duration = Duration::from_millis(50);
@@ -55,8 +56,6 @@ pub struct Look {
 /// Something to be done once.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Request {
-    /// Load this and show it instead; what is shown stays if that fails.
-    Open(Source),
     /// Empty the film.
     Restart,
     /// Save the picture as it is shown.
@@ -86,7 +85,8 @@ pub struct Message {
 }
 
 impl Message {
-    fn now(text: String, wrong: bool) -> Self {
+    /// A note of this moment.
+    pub fn now(text: String, wrong: bool) -> Self {
         Self { text, wrong, at: Instant::now() }
     }
 }
@@ -94,12 +94,12 @@ impl Message {
 /// What the thread is up to.
 #[derive(Clone, Debug, Default)]
 pub struct State {
-    /// What takes long at the moment, such as `loading room.glb`.
+    /// What takes long at the moment, such as `preparing the scene`.
     pub busy: Option<String>,
+    /// Since when.
+    pub busy_since: Option<Instant>,
     /// The last thing to tell.
     pub message: Option<Message>,
-    /// The scene on screen; a new one is a new `Arc`.
-    pub scene: Option<Arc<OpenScene>>,
     /// The picture, once there is one.
     pub picture: Option<Picture>,
     /// Figures.
@@ -115,6 +115,8 @@ pub struct State {
 #[derive(Default)]
 struct Shared {
     look: Mutex<Option<Look>>,
+    /// The newest version of the scene, until the thread takes it.
+    version: Mutex<Option<Arc<Scene>>>,
     state: Mutex<State>,
 }
 
@@ -163,6 +165,12 @@ impl Engine {
     /// Says what the window shows.
     pub fn look(&self, look: Look) {
         *lock(&self.shared.look) = Some(look);
+    }
+
+    /// Shows a version of the scene from now on. The last word counts: versions that come while one is prepared are
+    /// skipped.
+    pub fn set_scene(&self, version: Arc<Scene>) {
+        *lock(&self.shared.version) = Some(version);
     }
 
     /// Asks for something to be done; a thread that has stopped does nothing.
@@ -230,6 +238,7 @@ impl Worker {
                 Ok(None) => {}
                 Err(Closed) => return,
             }
+            self.take_version();
             let look = lock(&self.shared.look).clone();
             let Some(look) = look.filter(|_| self.tracing.is_open()) else { continue };
             if self.failed.as_ref() == Some(&look) {
@@ -328,7 +337,8 @@ impl Worker {
     /// The next request, waiting a little for one when there is nothing to trace.
     fn next_request(&self) -> Result<Option<Request>, Closed> {
         let up_to_date = |look: &Look| self.failed.as_ref() == Some(look) || look.controls.paused && !self.is_due(look);
-        let idle = !self.tracing.is_open() || lock(&self.shared.look).as_ref().is_none_or(up_to_date);
+        let nothing_to_show = !self.tracing.is_open() || lock(&self.shared.look).as_ref().is_none_or(up_to_date);
+        let idle = nothing_to_show && lock(&self.shared.version).is_none();
         if idle {
             match self.inbox.recv_timeout(IDLE) {
                 Ok(request) => Ok(Some(request)),
@@ -346,7 +356,6 @@ impl Worker {
 
     fn carry_out(&mut self, request: Request) {
         let result = match request {
-            Request::Open(source) => self.open(&source),
             Request::Restart => {
                 self.tracing.restart();
                 self.pacing.restart();
@@ -376,7 +385,7 @@ impl Worker {
         let film = self.tracing.film(&shown.look)?;
         let shared = Arc::clone(&self.shared);
         std::thread::Builder::new().name("save".into()).spawn(move || {
-            let message = match exr::write(&path, film) {
+            let message = match exr::write(&path, &film) {
                 Ok(()) => Message::now(format!("saved {}", path.display()), false),
                 Err(error) => Message::now(error.to_string(), true),
             };
@@ -385,24 +394,26 @@ impl Worker {
         Ok(None)
     }
 
-    fn open(&mut self, source: &Source) -> anyhow::Result<Option<String>> {
-        self.busy(Some(format!("loading {}", source.name())));
-        let scene = self.tracing.open(source)?;
-        self.shown = None;
+    /// Puts the newest version of the scene in the place of the last.
+    fn take_version(&mut self) {
+        let Some(version) = lock(&self.shared.version).take() else { return };
+        self.busy(Some("preparing the scene".into()));
+        let result = self.tracing.set_scene(version);
+        self.busy(None);
+        self.failed = None;
         self.pacing.restart();
         self.rate = Rate::default();
-        // What the window showed of the last scene says nothing about this one.
-        *lock(&self.shared.look) = None;
-        let mut state = lock(&self.shared.state);
-        state.scene = Some(Arc::new(scene));
-        state.message = None;
-        drop(state);
-        (self.repaint)();
-        Ok(None)
+        match result {
+            Ok(()) => self.shown = None,
+            Err(error) => self.tell(one_line(&error), true),
+        }
     }
 
     fn busy(&self, text: Option<String>) {
-        lock(&self.shared.state).busy = text;
+        let mut state = lock(&self.shared.state);
+        state.busy_since = text.as_ref().map(|_| Instant::now());
+        state.busy = text;
+        drop(state);
         (self.repaint)();
     }
 

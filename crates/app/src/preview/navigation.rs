@@ -42,6 +42,11 @@ impl Navigation {
         }
     }
 
+    /// Flies at a speed that suits a scene of the given diagonal (metres).
+    pub fn set_scale(&mut self, diagonal: f32) {
+        self.speed = diagonal.max(1e-3) / SECONDS_ACROSS;
+    }
+
     /// Goes to a camera, keeping the window's proportions.
     pub fn jump(&mut self, position: Vec3, rotation: Quat, vfov: f32) {
         let tan_half = self.standpoint.view.tan_half;

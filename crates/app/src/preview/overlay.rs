@@ -1,5 +1,7 @@
 //! What lies over the picture: settings, figures, notes and the list of keys.
 
+use std::time::Duration;
+
 use egui::{Align, Align2, Area, ComboBox, Context, DragValue, Grid, Id, Layout, Order, RichText, Slider, Ui};
 
 use super::controls::{Controls, MODES, Readout, Shown, TONE_MAPS, clock, metric};
@@ -287,6 +289,34 @@ pub fn message(ctx: &Context, text: &str, wrong: bool, busy: bool) {
                 let text = RichText::new(text);
                 ui.label(if wrong { text.color(theme::ERROR) } else { text });
             });
+        });
+    });
+}
+
+/// Draws what is being read, at the bottom; true when it is to be given up.
+pub fn loading(ctx: &Context, name: &str, elapsed: Duration, can_cancel: bool) -> bool {
+    let mut cancelled = false;
+    let area = Area::new(Id::unique("loading")).anchor(Align2::CENTER_BOTTOM, egui::vec2(0.0, -14.0));
+    area.order(Order::Foreground).show(ctx, |ui| {
+        theme::panel().show(ui, |ui| {
+            ui.horizontal(|ui| {
+                ui.add(egui::Spinner::new().size(13.0).color(theme::ACCENT));
+                ui.label(format!("loading {name}, {}", clock(elapsed)));
+                cancelled = can_cancel && ui.button("Cancel").clicked();
+            });
+        });
+    });
+    cancelled
+}
+
+/// Draws at the top why the scene's files cannot be read as they are; the last good version is on screen.
+pub fn broken(ctx: &Context, text: &str) {
+    let area = Area::new(Id::unique("broken")).anchor(Align2::CENTER_TOP, egui::vec2(0.0, 10.0));
+    area.order(Order::Foreground).interactable(false).show(ctx, |ui| {
+        theme::panel().show(ui, |ui| {
+            ui.set_max_width(0.5 * ui.ctx().content_rect().width());
+            ui.label(RichText::new(text).color(theme::ERROR));
+            ui.label(RichText::new("The last good version is shown; the file is watched.").small().weak());
         });
     });
 }

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use egui::{ColorImage, Context, ViewportCommand};
 use serde_json::{Value, json};
 
-use super::engine::State;
+use super::engine::{Message, State};
 use crate::output::png;
 use crate::settings::mode_name;
 
@@ -58,7 +58,7 @@ impl Screenshot {
     }
 
     /// To be called every frame.
-    pub fn update(&mut self, ctx: &Context, state: &State, gaze: impl FnOnce() -> Value) {
+    pub fn update(&mut self, ctx: &Context, state: &State, trouble: Option<&Message>, gaze: impl FnOnce() -> Value) {
         ctx.request_repaint_after(LOOK_INTERVAL);
         if let Ok(image) = self.receiver.try_recv() {
             let texels: Vec<[u8; 4]> = image.pixels.iter().map(|pixel| pixel.to_array()).collect();
@@ -68,7 +68,7 @@ impl Screenshot {
             return;
         }
         let failed = state.picture.is_none() && state.busy.is_none();
-        let reason = match &state.message {
+        let reason = match trouble.or(state.message.as_ref()) {
             _ if state.dead => Some("the renderer has stopped"),
             Some(message) if message.wrong && failed => Some(message.text.as_str()),
             _ => None,

@@ -13,7 +13,7 @@ use tracer::renderer::{FilmPose, Renderer, RendererOptions};
 use tracer::scene::Scene;
 use tracer::view::{DebugView, ViewProjection, ViewSettings};
 
-use super::controls::{Shown, metric};
+use super::controls::Shown;
 use super::engine::{Look, Picture};
 use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
@@ -22,29 +22,11 @@ use crate::output::exr::FilmFile;
 use crate::output::png;
 use crate::readback;
 use crate::sampling::{Acuity, Aim, GazePoint};
-use crate::session::{self, Loaded, Source, Viewpoint};
 use crate::settings::RunSettings;
 use crate::view::View;
 
 /// The read-out at the gaze is a mean over so many pixels to each side.
 const READOUT_RADIUS_PX: u32 = 3;
-
-/// A scene on screen.
-#[derive(Clone, Debug)]
-pub struct OpenScene {
-    /// What a person calls it.
-    pub name: String,
-    /// Triangles, lights, textures.
-    pub contents: String,
-    /// The file's cameras, or the one that frames the scene.
-    pub viewpoints: Vec<Viewpoint>,
-    /// Place in `viewpoints` to start from.
-    pub start: usize,
-    /// What the import met and did not support, one line each.
-    pub notes: Vec<String>,
-    /// Across all that is visible, metres.
-    pub diagonal: f32,
-}
 
 struct Open {
     scene: Arc<Scene>,
@@ -91,28 +73,8 @@ impl Tracing {
         self.open.is_some()
     }
 
-    /// Loads a scene; the last one stays if that fails.
-    pub fn open(&mut self, source: &Source) -> anyhow::Result<OpenScene> {
-        let Loaded { scene, mut notes } = session::load(source, &self.args.scene)?;
-        let viewpoints = session::viewpoints(&scene);
-        let start = session::choose(&viewpoints, self.args.scene.camera.as_ref()).unwrap_or_else(|error| {
-            notes.insert(0, session::one_line(&error));
-            0
-        });
-        let lights = scene.lights.len();
-        let contents = format!(
-            "{} triangles, {} textures{}",
-            metric(session::triangles(&scene) as f64),
-            scene.textures.len(),
-            if lights == 0 { String::new() } else { format!(", {lights} lights") },
-        );
-        let (low, high) = scene.bounds().unwrap_or((Vec3::ZERO, Vec3::ONE));
-        let name = scene.name.clone();
-        self.set_scene(scene)?;
-        Ok(OpenScene { name, contents, viewpoints, start, notes, diagonal: (high - low).length() })
-    }
-
-    fn set_scene(&mut self, scene: Arc<Scene>) -> anyhow::Result<()> {
+    /// Shows a version of a scene; the last one stays if that fails.
+    pub fn set_scene(&mut self, scene: Arc<Scene>) -> anyhow::Result<()> {
         match &mut self.open {
             Some(Open { renderer: Some(renderer), scene: shown, .. }) => {
                 renderer.set_scene(&scene)?;
@@ -281,15 +243,11 @@ impl Tracing {
     pub fn film(&mut self, look: &Look) -> anyhow::Result<FilmFile> {
         let open = self.open.as_ref().context("there is no film yet")?;
         let renderer = open.renderer.as_ref().context("there is no film yet")?;
-        let settings = RunSettings {
-            scene: &open.scene,
-            renderer: renderer.options(),
-            pose: renderer.pose(),
-            mode: look.controls.mode,
-            acuity: look.controls.acuity,
-            samples: renderer.samples(),
-        };
-        Ok(FilmFile::new(&renderer.snapshot()?, settings.to_json()))
+        let aim = self.aim.as_ref().context("there is no film yet")?;
+        let film = renderer.snapshot()?;
+        let acuity = look.controls.acuity;
+        let settings = RunSettings { scene: &open.scene.name, film: &film.header, aim, acuity }.to_json();
+        Ok(FilmFile::new(film, settings))
     }
 
     fn renderer(&mut self) -> anyhow::Result<&mut Renderer> {

@@ -13,27 +13,40 @@ use super::gaze::{self, Gaze, ScreenMapping, fovea_ring};
 use super::gaze_control::GazeControl;
 use super::gaze_panel;
 use super::navigation::Navigation;
+use super::open_scene::OpenScene;
 use super::overlay::{self, Action, Facts, Visibility};
 use super::screenshot::Screenshot;
-use super::tracing::OpenScene;
+use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
+use crate::cli::values::CameraChoice;
 use crate::output::free_name;
-use crate::session::Source;
+use crate::reload::{LoadEvent, Loader};
+use crate::session::{Loaded, Source};
 
 /// How long a note stays.
 const NOTE: Duration = Duration::from_secs(5);
 /// How long a complaint stays.
 const COMPLAINT: Duration = Duration::from_secs(12);
 
+/// What takes no longer is not worth a word.
+const WORTH_SAYING: Duration = Duration::from_millis(200);
+
 /// The application.
 pub struct Window {
     engine: Engine,
+    loader: Loader,
+    /// Camera that the command line asked for.
+    asked_camera: Option<CameraChoice>,
+    /// What the window itself has to tell.
+    note: Option<Message>,
+    /// Why the files of the open scene cannot be read as they are now.
+    broken: Option<String>,
     adapter: String,
     controls: Controls,
     visibility: Visibility,
     gaze: GazeControl,
-    /// The scene that `navigation` moves in.
-    scene: Option<(Arc<OpenScene>, Navigation)>,
+    /// The scene that the navigation moves in.
+    scene: Option<(OpenScene, Navigation)>,
     camera: usize,
     texture: Option<(egui::TextureId, u64)>,
     screenshot: Option<Screenshot>,
@@ -43,15 +56,20 @@ impl Window {
     /// A window over a running engine.
     pub fn new(
         engine: Engine,
+        loader: Loader,
         adapter: String,
-        controls: Controls,
+        args: &PreviewArgs,
         gaze: GazeControl,
         screenshot: Option<Screenshot>,
     ) -> Self {
         Self {
             engine,
+            loader,
+            asked_camera: args.scene.camera.clone(),
+            note: None,
+            broken: None,
             adapter,
-            controls,
+            controls: Controls::from(args),
             visibility: Visibility { gaze: gaze.is_worth_showing(), ..Visibility::default() },
             gaze,
             scene: None,
@@ -61,18 +79,42 @@ impl Window {
         }
     }
 
-    /// Starts from a new scene's camera.
-    fn follow_scene(&mut self, state: &State, rect: Rect) {
-        let Some(open) = &state.scene else { return };
-        if self.scene.as_ref().is_some_and(|(known, _)| Arc::ptr_eq(known, open)) {
-            return;
+    /// Takes what the loader has: a new scene starts from its camera, a new version of the same one keeps the view.
+    fn follow_loader(&mut self, ctx: &Context, rect: Rect) {
+        while let Some(event) = self.loader.poll() {
+            match event {
+                LoadEvent::Opened(source, loaded) => {
+                    let title = format!("{} - Fovea", source.name());
+                    ctx.send_viewport_cmd(egui::ViewportCommand::Title(title));
+                    self.open(&loaded, rect);
+                }
+                LoadEvent::Changed(loaded) => self.follow_file(loaded, rect),
+                LoadEvent::NotOpened(text) => self.note = Some(Message::now(text, true)),
+                LoadEvent::Broken(text) => self.broken = Some(text),
+            }
         }
+    }
+
+    fn open(&mut self, loaded: &Loaded, rect: Rect) {
+        let open = OpenScene::new(loaded, self.asked_camera.as_ref());
         let aspect = rect.width() / rect.height().max(1.0);
+        (self.note, self.broken) = (None, None);
         if let Some(start) = open.viewpoints.get(open.start) {
             let navigation = Navigation::new(start.position, start.rotation, start.vfov, aspect, open.diagonal);
-            self.scene = Some((Arc::clone(open), navigation));
             self.camera = open.start;
+            self.engine.set_scene(Arc::clone(&loaded.scene));
+            self.scene = Some((open, navigation));
         }
+    }
+
+    fn follow_file(&mut self, loaded: Loaded, rect: Rect) {
+        self.broken = None;
+        let Some((open, navigation)) = &mut self.scene else { return self.open(&loaded, rect) };
+        *open = OpenScene::new(&loaded, self.asked_camera.as_ref());
+        navigation.set_scale(open.diagonal);
+        self.camera = self.camera.min(open.viewpoints.len().saturating_sub(1));
+        self.engine.set_scene(loaded.scene);
+        self.note = Some(Message::now("read again: the file has changed".into(), false));
     }
 
     /// Puts the engine's texture on the screen.
@@ -136,9 +178,26 @@ impl Window {
     }
 
     fn message(&self, ctx: &Context, state: &State) {
-        if let Some(busy) = &state.busy {
-            overlay::message(ctx, busy, false, true);
-            return;
+        if let Some(text) = &self.broken {
+            overlay::broken(ctx, text);
+        }
+        if let Some(loading) = self.loader.loading() {
+            let elapsed = loading.since.elapsed();
+            if elapsed >= WORTH_SAYING || self.scene.is_none() {
+                if overlay::loading(ctx, &loading.name, elapsed, self.scene.is_some()) {
+                    self.loader.cancel();
+                }
+                ctx.request_repaint_after(WORTH_SAYING);
+                return;
+            }
+            ctx.request_repaint_after(WORTH_SAYING - elapsed);
+        }
+        if let Some((busy, since)) = state.busy.as_ref().zip(state.busy_since) {
+            if since.elapsed() >= WORTH_SAYING {
+                overlay::message(ctx, busy, false, true);
+                return;
+            }
+            ctx.request_repaint_after(WORTH_SAYING);
         }
         if state.dead {
             overlay::message(ctx, "the renderer has stopped; the terminal says why", true, false);
@@ -148,12 +207,13 @@ impl Window {
             overlay::message(ctx, &note, false, false);
             return;
         }
-        let Some(Message { text, wrong, at }) = &state.message else { return };
+        let newest = self.note.iter().chain(&state.message).max_by_key(|message| message.at);
+        let Some(Message { text, wrong, at }) = newest else { return };
         let stays = if *wrong { COMPLAINT } else { NOTE };
         // Without a scene there is nothing else to see, so the reason stays.
         if let Some(left) = stays.checked_sub(at.elapsed()) {
             ctx.request_repaint_after(left);
-        } else if state.scene.is_some() {
+        } else if self.scene.is_some() {
             return;
         }
         overlay::message(ctx, text, *wrong, false);
@@ -232,7 +292,7 @@ impl Window {
     fn open_dropped_file(&self, ctx: &Context) {
         let dropped = ctx.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_owned()));
         if let Some(path) = dropped {
-            self.engine.request(Request::Open(Source::File(path)));
+            self.loader.open(Source::File(path));
         }
     }
 }
@@ -243,7 +303,7 @@ impl eframe::App for Window {
         let state = self.engine.state();
         let rect = ui.max_rect();
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
-        self.follow_scene(&state, rect);
+        self.follow_loader(&ctx, rect);
         self.keys(&ctx);
         if let Some((_, navigation)) = &mut self.scene {
             navigation.update(ui, &response);
@@ -278,7 +338,8 @@ impl eframe::App for Window {
         self.gaze.remember_screen(&self.controls, now);
         self.open_dropped_file(&ctx);
         if let Some(screenshot) = &mut self.screenshot {
-            screenshot.update(&ctx, &state, || self.gaze.figures(now));
+            let trouble = self.note.as_ref().filter(|note| note.wrong && self.loader.loading().is_none());
+            screenshot.update(&ctx, &state, trouble, || self.gaze.figures(now));
         }
     }
 

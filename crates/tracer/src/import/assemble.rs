@@ -11,7 +11,7 @@ use super::graph::{Graph, Placement};
 use super::hash_meshes;
 use super::material;
 use super::primitive::Built;
-use super::report::{ImportReport, ImportWarning};
+use super::report::{ImportReport, ImportWarning, SceneNode};
 use crate::scene::{Environment, Instance, Material, Mesh, Scene, Texture};
 
 /// A scene is stored relative to its centre when that is farther from the file's origin than this many diagonals of its
@@ -75,6 +75,7 @@ impl Parts<'_> {
         if instances.is_empty() {
             return Err(Fault::new(scene_place(report), ContentError::NoTriangles));
         }
+        report.nodes = nodes(document, &graph.world_from_node, origin_in_file);
         let lights = graph.lights.into_iter().map(|mut light| {
             light.item.position = (light.position_in_world - origin_in_file).as_vec3();
             light.item
@@ -100,6 +101,26 @@ impl Parts<'_> {
         }
         Ok(scene)
     }
+}
+
+/// The file's nodes with their parents and places.
+fn nodes(document: &Document<'_>, world_from_node: &[DAffine3], origin_in_file: DVec3) -> Vec<SceneNode> {
+    let mut nodes: Vec<SceneNode> = document
+        .nodes
+        .iter()
+        .zip(world_from_node)
+        .map(|(node, &world)| SceneNode {
+            name: node.name.clone(),
+            parent: None,
+            world_from_node: affine_f32(DAffine3::from_translation(-origin_in_file) * world),
+        })
+        .collect();
+    for (index, node) in document.nodes.iter().enumerate() {
+        for &child in &node.children {
+            nodes[child].parent = Some(index_u32(index));
+        }
+    }
+    nodes
 }
 
 fn scene_place(report: &ImportReport) -> String {

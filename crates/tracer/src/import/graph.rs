@@ -41,6 +41,8 @@ pub(super) struct Graph<'a> {
     pub(super) placements: Vec<Placement>,
     pub(super) cameras: Vec<Posed<Camera>>,
     pub(super) lights: Vec<Posed<PunctualLight>>,
+    /// By index of the node.
+    pub(super) world_from_node: Vec<DAffine3>,
 }
 
 /// What the walk needs to know.
@@ -61,7 +63,13 @@ impl<'a> Walk<'a> {
         let document = self.data.document;
         let pose = Pose::at(self.data, self.time_secs)?;
         let world_from_node = pose::world_from_node(self.data, &pose)?;
-        let mut graph = Graph { requests: Vec::new(), placements: Vec::new(), cameras: Vec::new(), lights: Vec::new() };
+        let mut graph = Graph {
+            requests: Vec::new(),
+            placements: Vec::new(),
+            cameras: Vec::new(),
+            lights: Vec::new(),
+            world_from_node: Vec::new(),
+        };
         let mut request_of_key: BTreeMap<MeshKey, usize> = BTreeMap::new();
         let mut open: Vec<(usize, bool)> = self.roots.iter().rev().map(|&n| (n, true)).collect();
         let mut seen = vec![false; document.nodes.len()];
@@ -122,6 +130,7 @@ impl<'a> Walk<'a> {
                 }));
             }
         }
+        graph.world_from_node = world_from_node;
         Ok(graph)
     }
 

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use glam::Affine3A;
+
 /// What was read, ignored, repaired or replaced.
 #[derive(Clone, Debug, Default)]
 pub struct ImportReport {
@@ -27,6 +29,20 @@ pub struct ImportReport {
     pub stage_seconds: ImportSeconds,
     /// The file and its companions, for watching.
     pub files: Vec<PathBuf>,
+    /// All nodes of the file by index, those of other scenes too; [`Instance::node`](crate::scene::Instance::node) refers
+    /// to them.
+    pub nodes: Vec<SceneNode>,
+}
+
+/// A node of the file's graph.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneNode {
+    /// As in the file; may be empty, need not be unique.
+    pub name: String,
+    /// Index of the node that it hangs on.
+    pub parent: Option<u32>,
+    /// Its place, relative to [`Scene::origin_in_file`](crate::scene::Scene::origin_in_file); need not be invertible.
+    pub world_from_node: Affine3A,
 }
 
 /// Wall-clock time of the stages of an import, seconds. Geometry and textures run at the same time.

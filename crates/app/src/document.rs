@@ -1,0 +1,269 @@
+//! The scene as it is worked on: the file's version, edits on top of it, and their history.
+//!
+//! A document makes immutable [`Scene`] versions and never changes one. Edits are values ([`Edits`]); undo puts earlier
+//! ones back. When the file changes on disk, the edits are put onto the new version wherever a part of the same name is
+//! still there.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::Affine3A;
+use tracer::import::SceneNode;
+use tracer::scene::{EnvironmentImage, Scene};
+
+use crate::session::Loaded;
+use apply::Environments;
+use edits::{Edit, Edits, Part, Target};
+use tree::{PartName, Tree};
+
+pub mod apply;
+pub mod edits;
+pub mod parameters;
+mod reapply;
+pub mod sidecar;
+pub mod tree;
+
+/// Most steps that can be undone; the oldest go first.
+const MOST_STEPS: usize = 500;
+
+/// Whether an edit is one of many that a drag or slider makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Gesture {
+    /// Complete in itself.
+    Once,
+    /// Goes on: further edits of the same target are the same step, until [`Document::end_gesture`].
+    GoesOn,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Images(BTreeMap<PathBuf, Arc<EnvironmentImage>>);
+
+impl Environments for Images {
+    fn get(&self, path: &Path) -> Option<Arc<EnvironmentImage>> {
+        self.0.get(path).cloned()
+    }
+}
+
+/// The names of a file's parts.
+#[derive(Clone, Debug, Default)]
+struct Names {
+    nodes: Vec<PartName>,
+    materials: Vec<PartName>,
+    lights: Vec<PartName>,
+}
+
+impl Names {
+    fn of(scene: &Scene, nodes: &[SceneNode]) -> Self {
+        Self {
+            nodes: tree::part_names(nodes.iter().map(|node| node.name.as_str())),
+            materials: tree::part_names(scene.materials.iter().map(|material| material.name.as_str())),
+            lights: tree::part_names(scene.lights.iter().map(|light| light.name.as_str())),
+        }
+    }
+}
+
+/// A scene with edits.
+#[derive(Clone, Debug)]
+pub struct Document {
+    file: Arc<Scene>,
+    nodes: Vec<SceneNode>,
+    tree: Tree,
+    names: Names,
+    edits: Edits,
+    /// Earlier and later edits, the nearest last.
+    undo: Vec<Edits>,
+    redo: Vec<Edits>,
+    gesture: Option<Target>,
+    saved: Edits,
+    solo: Option<u32>,
+    environments: Images,
+    version: Arc<Scene>,
+}
+
+impl Document {
+    /// A file's scene without edits.
+    pub fn new(loaded: &Loaded) -> Self {
+        let (file, nodes) = (Arc::clone(&loaded.scene), loaded.nodes.clone());
+        Self {
+            tree: Tree::new(&nodes, &file),
+            names: Names::of(&file, &nodes),
+            version: Arc::clone(&file),
+            file,
+            nodes,
+            edits: Edits::default(),
+            undo: Vec::new(),
+            redo: Vec::new(),
+            gesture: None,
+            saved: Edits::default(),
+            solo: None,
+            environments: Images::default(),
+        }
+    }
+
+    /// The version that is to be shown.
+    pub fn version(&self) -> &Arc<Scene> {
+        &self.version
+    }
+
+    /// The file's own version.
+    pub fn file(&self) -> &Arc<Scene> {
+        &self.file
+    }
+
+    /// The file's nodes.
+    pub fn nodes(&self) -> &[SceneNode] {
+        &self.nodes
+    }
+
+    /// What hangs on what.
+    pub fn tree(&self) -> &Tree {
+        &self.tree
+    }
+
+    /// What differs from the file.
+    pub fn edits(&self) -> &Edits {
+        &self.edits
+    }
+
+    /// Whether there are edits that have not been saved.
+    pub fn is_unsaved(&self) -> bool {
+        self.edits != self.saved
+    }
+
+    /// The node that alone is shown, with all that hangs on it.
+    pub fn solo(&self) -> Option<u32> {
+        self.solo
+    }
+
+    /// Shows one node alone, or all again. Not an edit: it is neither undone nor saved.
+    pub fn set_solo(&mut self, node: Option<u32>) {
+        self.solo = node;
+        self.remake();
+    }
+
+    /// Whether a node is shown.
+    pub fn is_visible(&self, node: u32) -> bool {
+        apply::is_visible(node, true, &self.tree, &self.edits, self.solo)
+    }
+
+    /// What takes a point of the file's world to where it is now, for what hangs on a node.
+    pub fn world_from_file(&self, node: u32) -> Affine3A {
+        apply::world_from_file(node, &self.nodes, &self.tree, &self.edits)
+    }
+
+    /// The same for what a node hangs on.
+    pub fn world_from_file_above(&self, node: u32) -> Affine3A {
+        self.tree.parent(node).map_or(Affine3A::IDENTITY, |parent| self.world_from_file(parent))
+    }
+
+    /// Makes an edit.
+    pub fn edit(&mut self, edit: &Edit, gesture: Gesture) {
+        let mut edits = self.edits.clone();
+        edits.make(edit);
+        let goes_on = self.gesture == Some(edit.target());
+        self.gesture = (gesture == Gesture::GoesOn).then_some(edit.target());
+        if edits == self.edits {
+            return;
+        }
+        let before = std::mem::replace(&mut self.edits, edits);
+        if !goes_on {
+            if self.undo.len() == MOST_STEPS {
+                self.undo.remove(0);
+            }
+            self.undo.push(before);
+        }
+        self.redo.clear();
+        self.remake();
+    }
+
+    /// The next edit is a step of its own.
+    pub fn end_gesture(&mut self) {
+        self.gesture = None;
+    }
+
+    /// Whether there is a step to undo.
+    pub fn can_undo(&self) -> bool {
+        !self.undo.is_empty()
+    }
+
+    /// Whether there is a step to make again.
+    pub fn can_redo(&self) -> bool {
+        !self.redo.is_empty()
+    }
+
+    /// Takes the last step back.
+    pub fn undo(&mut self) {
+        if let Some(edits) = self.undo.pop() {
+            self.redo.push(std::mem::replace(&mut self.edits, edits));
+            self.end_gesture();
+            self.remake();
+        }
+    }
+
+    /// Makes the last step that was undone again.
+    pub fn redo(&mut self) {
+        if let Some(edits) = self.redo.pop() {
+            self.undo.push(std::mem::replace(&mut self.edits, edits));
+            self.end_gesture();
+            self.remake();
+        }
+    }
+
+    /// Takes edits from a file as they are, without a step to undo.
+    pub fn take_saved(&mut self, edits: Edits) {
+        self.saved.clone_from(&edits);
+        self.edits = edits;
+        self.remake();
+    }
+
+    /// Says that the edits are saved as they are.
+    pub fn set_saved(&mut self) {
+        self.saved.clone_from(&self.edits);
+    }
+
+    /// Knows an environment's image from now on.
+    pub fn add_environment(&mut self, path: PathBuf, image: Arc<EnvironmentImage>) {
+        self.environments.0.insert(path, image);
+        self.remake();
+    }
+
+    /// The environment image that the edits name and that is not known yet.
+    pub fn wanted_environment(&self) -> Option<&Path> {
+        let path = self.edits.environment.image.as_deref()?;
+        self.environments.get(path).is_none().then_some(path)
+    }
+
+    /// Goes on from a newer version of the file. What is selected is named by its new index, if it is still there; edits
+    /// of parts that are gone are dropped, and named.
+    pub fn follow_file(&mut self, loaded: &Loaded, selected: Option<Part>) -> (Option<Part>, Vec<String>) {
+        let names = Names::of(&loaded.scene, &loaded.nodes);
+        let places = reapply::Places::new(&self.names, &names);
+        let dropped = places.missing(&self.edits, &self.names);
+        for edits in self.undo.iter_mut().chain(&mut self.redo).chain([&mut self.edits, &mut self.saved]) {
+            *edits = places.of_edits(edits);
+        }
+        self.solo = self.solo.and_then(|node| places.node(node));
+        self.file = Arc::new((*loaded.scene).clone().sharing_parts_of(&self.file));
+        self.nodes.clone_from(&loaded.nodes);
+        self.tree = Tree::new(&self.nodes, &self.file);
+        self.names = names;
+        self.end_gesture();
+        self.remake();
+        (selected.and_then(|part| places.part(part)), dropped)
+    }
+
+    fn remake(&mut self) {
+        let unchanged = self.edits.is_empty() && self.solo.is_none();
+        self.version = if unchanged {
+            Arc::clone(&self.file)
+        } else {
+            let made =
+                apply::apply(&self.file, &self.nodes, &self.tree, &self.edits, self.solo, &self.environments);
+            Arc::new(made.sharing_parts_of(&self.version))
+        };
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,215 @@
+//! Saved edits: a small JSON file beside the scene, `SCENE.fovea.json`.
+//!
+//! A sidecar, not a new glTF: a written glTF would lose what this program does not read (extensions, animation, custom
+//! properties), and the next export of the scene's own program would overwrite it. The sidecar outlives both, since parts
+//! are found by name. Lengths are metres, angles degrees, colours linear Rec. 709.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use glam::{Quat, Vec3};
+use serde_json::{Map, Value as Json, json};
+
+use super::edits::{Edits, EnvironmentEdit, LightEdit, Move, NodeEdit};
+use super::parameters::{MaterialParameter, Value};
+use super::tree::PartName;
+use super::{Document, Names};
+use crate::output::{OutputError, write_atomically};
+
+/// What the file says it is.
+const FORMAT: &str = "fovea-edits";
+/// Raised when old programs would misread the file.
+const VERSION: u64 = 1;
+
+/// Where the edits of a scene are kept.
+pub fn path_for(scene: &Path) -> PathBuf {
+    let mut name = scene.as_os_str().to_owned();
+    name.push(".fovea.json");
+    PathBuf::from(name)
+}
+
+impl Document {
+    /// Saves the edits; without any, a file of earlier ones is overwritten by an empty list.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn save_edits(&mut self, path: &Path) -> Result<(), OutputError> {
+        let text = serde_json::to_string_pretty(&self.to_json()).expect("keys are strings");
+        write_atomically(path, |writer| writeln!(writer, "{text}").map_err(|error| error.to_string()))?;
+        self.set_saved();
+        Ok(())
+    }
+
+    /// The edits as one JSON object.
+    pub fn to_json(&self) -> Json {
+        let edits = self.edits();
+        let named = |names: &[PartName], index: u32, edit: Map<String, Json>| {
+            let name = names.get(index as usize);
+            let mut object = Map::new();
+            object.insert("name".into(), json!(name.map_or("", |name| name.name.as_str())));
+            object.insert("occurrence".into(), json!(name.map_or(index, |name| name.occurrence)));
+            object.extend(edit);
+            Json::Object(object)
+        };
+        let nodes = edits.nodes.iter().map(|(node, edit)| named(&self.names.nodes, *node, node_json(edit)));
+        let materials = edits.materials.iter().map(|(material, values)| {
+            let values = values.iter().map(|(parameter, value)| (parameter.key().to_owned(), value_json(*value)));
+            named(&self.names.materials, *material, values.collect())
+        });
+        let lights = edits.lights.iter().map(|(light, edit)| named(&self.names.lights, *light, light_json(edit)));
+        json!({
+            "format": FORMAT,
+            "version": VERSION,
+            "nodes": nodes.collect::<Vec<_>>(),
+            "materials": materials.collect::<Vec<_>>(),
+            "lights": lights.collect::<Vec<_>>(),
+            "environment": environment_json(&edits.environment),
+        })
+    }
+
+    /// Takes the edits of a file; what names no part of this scene is left out and named.
+    ///
+    /// # Errors
+    /// One line, when the file cannot be read or is no file of edits.
+    pub fn load_edits(&mut self, path: &Path) -> Result<Vec<String>, String> {
+        let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        let (edits, left_out) =
+            parse(&text, &self.names).map_err(|reason| format!("{}: {reason}", path.display()))?;
+        self.take_saved(edits);
+        Ok(left_out)
+    }
+}
+
+fn node_json(edit: &NodeEdit) -> Map<String, Json> {
+    let mut object = Map::new();
+    let Move { translation, rotation, scale } = edit.moved;
+    if edit.moved != Move::default() {
+        object.insert("translation_m".into(), json!(translation.to_array()));
+        object.insert("rotation_xyzw".into(), json!(rotation.to_array()));
+        object.insert("scale".into(), json!(scale.to_array()));
+    }
+    if let Some(hidden) = edit.hidden {
+        object.insert("hidden".into(), json!(hidden));
+    }
+    object
+}
+
+fn value_json(value: Value) -> Json {
+    match value {
+        Value::Number(x) => json!(x),
+        Value::Color(color) => json!(color.to_array()),
+    }
+}
+
+fn light_json(edit: &LightEdit) -> Map<String, Json> {
+    let mut object = Map::new();
+    if let Some(intensity) = edit.intensity {
+        object.insert("intensity".into(), json!(intensity.to_array()));
+    }
+    if let Some(angle) = edit.angle {
+        object.insert("angle_deg".into(), json!(angle.to_degrees()));
+    }
+    if edit.translation != Vec3::ZERO {
+        object.insert("translation_m".into(), json!(edit.translation.to_array()));
+    }
+    object
+}
+
+fn environment_json(edit: &EnvironmentEdit) -> Json {
+    let mut object = Map::new();
+    if let Some(image) = &edit.image {
+        object.insert("image".into(), json!(image.to_string_lossy()));
+    }
+    if let Some(radiance) = edit.radiance {
+        object.insert("radiance".into(), json!(radiance.to_array()));
+    }
+    if let Some(rotation) = edit.rotation_deg {
+        object.insert("rotation_deg".into(), json!(rotation));
+    }
+    if let Some(intensity) = edit.intensity {
+        object.insert("intensity".into(), json!(intensity));
+    }
+    Json::Object(object)
+}
+
+/// Edits for the parts of these names, and what names none of them.
+fn parse(text: &str, names: &Names) -> Result<(Edits, Vec<String>), String> {
+    let json: Json = serde_json::from_str(text).map_err(|error| format!("no file of edits: {error}"))?;
+    if json["format"] != FORMAT {
+        return Err(format!("no file of edits: its format is not \"{FORMAT}\""));
+    }
+    if json["version"] != VERSION {
+        return Err(format!("edits of version {}; this program reads version {VERSION}", json["version"]));
+    }
+    let (mut edits, mut left_out) = (Edits::default(), Vec::new());
+    for (entry, index) in entries(&json["nodes"], &names.nodes, "object", &mut left_out) {
+        edits.nodes.insert(index, node_edit(entry));
+    }
+    for (entry, index) in entries(&json["materials"], &names.materials, "material", &mut left_out) {
+        let values = MaterialParameter::ALL.into_iter().filter_map(|parameter| {
+            let value = &entry[parameter.key()];
+            let value = vector(value).map(Value::Color).or_else(|| number(value).map(Value::Number))?;
+            Some((parameter, value))
+        });
+        edits.materials.insert(index, values.collect());
+    }
+    for (entry, index) in entries(&json["lights"], &names.lights, "light", &mut left_out) {
+        let edit = LightEdit {
+            intensity: vector(&entry["intensity"]),
+            angle: number(&entry["angle_deg"]).map(f32::to_radians),
+            translation: vector(&entry["translation_m"]).unwrap_or_default(),
+        };
+        edits.lights.insert(index, edit);
+    }
+    let environment = &json["environment"];
+    edits.environment = EnvironmentEdit {
+        image: environment["image"].as_str().map(PathBuf::from),
+        radiance: vector(&environment["radiance"]),
+        rotation_deg: number(&environment["rotation_deg"]),
+        intensity: number(&environment["intensity"]),
+    };
+    Ok((edits, left_out))
+}
+
+fn node_edit(entry: &Json) -> NodeEdit {
+    let usual = Move::default();
+    let rotation = entry["rotation_xyzw"].as_array().filter(|values| values.len() == 4).and_then(|values| {
+        let [x, y, z, w] = [0, 1, 2, 3].map(|index| number(&values[index]));
+        Some(Quat::from_xyzw(x?, y?, z?, w?))
+    });
+    let moved = Move {
+        translation: vector(&entry["translation_m"]).unwrap_or(usual.translation),
+        rotation: rotation.unwrap_or(usual.rotation),
+        scale: vector(&entry["scale"]).unwrap_or(usual.scale),
+    };
+    NodeEdit { moved: moved.sane(), hidden: entry["hidden"].as_bool() }
+}
+
+/// The entries of a list that name a part, with its place.
+fn entries<'a>(
+    list: &'a Json,
+    names: &[PartName],
+    kind: &str,
+    left_out: &mut Vec<String>,
+) -> Vec<(&'a Json, u32)> {
+    let mut found = Vec::new();
+    for entry in list.as_array().into_iter().flatten() {
+        let name = entry["name"].as_str().unwrap_or_default();
+        let occurrence = entry["occurrence"].as_u64().unwrap_or(0);
+        let fits = |part: &PartName| part.name == name && u64::from(part.occurrence) == occurrence;
+        match names.iter().zip(0..).find(|(part, _)| fits(part)) {
+            Some((_, index)) => found.push((entry, index)),
+            None => left_out.push(format!("{kind} '{}'", name.replace(['\n', '\r'], " "))),
+        }
+    }
+    found
+}
+
+fn number(value: &Json) -> Option<f32> {
+    value.as_f64().map(|x| x as f32).filter(|x| x.is_finite())
+}
+
+fn vector(value: &Json) -> Option<Vec3> {
+    let values = value.as_array().filter(|values| values.len() == 3)?;
+    Some(Vec3::new(number(&values[0])?, number(&values[1])?, number(&values[2])?))
+}

@@ -1,0 +1,99 @@
+//! The scene's nodes as a tree: what hangs on what, and what a name means in another version of the file.
+
+use std::collections::HashMap;
+
+use tracer::import::SceneNode;
+use tracer::scene::Scene;
+
+/// Children and parents of the nodes that place something.
+#[derive(Clone, Debug, Default)]
+pub struct Tree {
+    /// Nodes without a parent, in the file's order.
+    pub roots: Vec<u32>,
+    /// By node.
+    children: Vec<Vec<u32>>,
+    parents: Vec<Option<u32>>,
+}
+
+impl Tree {
+    /// The tree of all nodes that place triangles, or on which such a node hangs.
+    pub fn new(nodes: &[SceneNode], scene: &Scene) -> Self {
+        let mut kept = vec![false; nodes.len()];
+        for instance in &scene.instances {
+            let mut next = Some(instance.node);
+            while let Some(node) = next {
+                match kept.get_mut(node as usize) {
+                    Some(kept) if !*kept => *kept = true,
+                    _ => break,
+                }
+                next = nodes[node as usize].parent;
+            }
+        }
+        let mut tree = Self {
+            roots: Vec::new(),
+            children: vec![Vec::new(); nodes.len()],
+            parents: nodes.iter().map(|node| node.parent).collect(),
+        };
+        for (index, node) in (0u32..).zip(nodes).filter(|(index, _)| kept[*index as usize]) {
+            match node.parent.and_then(|parent| tree.children.get_mut(parent as usize)) {
+                Some(siblings) => siblings.push(index),
+                None => tree.roots.push(index),
+            }
+        }
+        tree
+    }
+
+    /// What hangs on a node.
+    pub fn children(&self, node: u32) -> &[u32] {
+        self.children.get(node as usize).map_or(&[], Vec::as_slice)
+    }
+
+    /// What a node hangs on.
+    pub fn parent(&self, node: u32) -> Option<u32> {
+        self.parents.get(node as usize).copied().flatten()
+    }
+
+    /// A node and all that it hangs on, from itself up.
+    pub fn line(&self, node: u32) -> impl Iterator<Item = u32> + '_ {
+        std::iter::successors(Some(node), |node| self.parent(*node))
+    }
+
+    /// A node and all that hangs on it.
+    pub fn below(&self, node: u32) -> Vec<u32> {
+        let mut below = vec![node];
+        let mut next = 0;
+        while let Some(&node) = below.get(next) {
+            below.extend(self.children(node));
+            next += 1;
+        }
+        below
+    }
+}
+
+/// What a part is called: its name, and which of those that share it.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct PartName {
+    /// May be empty.
+    pub name: String,
+    /// 0 for the first of that name.
+    pub occurrence: u32,
+}
+
+/// The names of a list of parts, in order.
+pub fn part_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<PartName> {
+    let mut counts: HashMap<&str, u32> = HashMap::new();
+    names
+        .into_iter()
+        .map(|name| {
+            let count = counts.entry(name).or_default();
+            *count += 1;
+            PartName { name: name.to_owned(), occurrence: *count - 1 }
+        })
+        .collect()
+}
+
+/// Where the parts of one list are in another, by name.
+pub fn places(from: &[PartName], to: &[PartName]) -> Vec<Option<u32>> {
+    let index: HashMap<&PartName, u32> = to.iter().zip(0..).collect();
+    from.iter().map(|name| index.get(name).copied()).collect()
+}

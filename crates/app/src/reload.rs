@@ -1,0 +1,385 @@
+//! Opens scenes in the background and reads them again when their files change.
+//!
+//! A thread of its own watches a scene's files and companions; every reading runs on a further thread, so that a newer
+//! wish never waits for an older one. What was read comes out as a [`LoadEvent`]; a scene that cannot be read changes
+//! nothing but says why. See [`rule`] for when files are read.
+
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant, SystemTime};
+
+use notify::{RecursiveMode, Watcher};
+
+use crate::cli::SceneArgs;
+use crate::session::{self, Loaded, Source, one_line};
+use rule::{Reading, Rule, Step, Timing};
+use stamps::{Stamps, folders};
+
+pub mod rule;
+pub mod stamps;
+
+/// How long a thread without a scene sleeps.
+const IDLE: Duration = Duration::from_secs(3600);
+
+/// What came of opening or reading again.
+#[derive(Clone, Debug)]
+pub enum LoadEvent {
+    /// A scene that was asked for.
+    Opened(Source, Loaded),
+    /// A newer version of the scene that is open.
+    Changed(Loaded),
+    /// A scene that was asked for cannot be opened: one line.
+    NotOpened(String),
+    /// The files of the open scene cannot be read as they are now: one line. The last version stays.
+    Broken(String),
+}
+
+/// What takes time at the moment.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Loading {
+    /// The scene's name.
+    pub name: String,
+    /// Since when.
+    pub since: Instant,
+}
+
+enum Note {
+    Open(Source),
+    Cancel,
+    /// Something happened in a watched folder.
+    Stirred,
+    Read(Box<Finished>),
+    Close,
+}
+
+struct Finished {
+    number: u64,
+    source: Source,
+    /// When the reading began.
+    began: SystemTime,
+    result: Result<Loaded, String>,
+}
+
+/// Handle of the thread; dropping it stops the thread. A reading that goes on is left to end by itself.
+pub struct Loader {
+    notes: Sender<Note>,
+    events: Receiver<LoadEvent>,
+    loading: Arc<Mutex<Option<Loading>>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Loader {
+    /// Starts the thread; `wake` is called whenever there is an event or a reading begins or ends.
+    ///
+    /// # Errors
+    /// When the system gives no thread.
+    pub fn start(args: SceneArgs, timing: Timing, wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
+        let (notes, inbox) = mpsc::channel();
+        let (outbox, events) = mpsc::channel();
+        let loading = Arc::new(Mutex::new(None));
+        let stirred = Arc::new(AtomicBool::new(false));
+        let watcher = notify::recommended_watcher({
+            let (stirred, notes) = (Arc::clone(&stirred), notes.clone());
+            move |event: notify::Result<notify::Event>| {
+                // Reading a file stirs nothing: only what may have changed one counts. A long write stirs thousands of
+                // times; one note at a time is enough.
+                if !event.is_ok_and(|event| event.kind.is_access()) && !stirred.swap(true, Ordering::AcqRel) {
+                    // The thread has ended: nobody is interested any more.
+                    let _ = notes.send(Note::Stirred);
+                }
+            }
+        });
+        let worker = Worker {
+            args,
+            timing,
+            notes: notes.clone(),
+            inbox,
+            outbox,
+            stirred,
+            loading: Arc::clone(&loading),
+            wake: Box::new(wake),
+            // Without a watcher the files are looked at now and then, as on drives that report nothing.
+            watcher: watcher.ok(),
+            watched: Vec::new(),
+            number: 0,
+            reading: None,
+            open: None,
+        };
+        let thread = std::thread::Builder::new().name("loader".into()).spawn(move || worker.run())?;
+        Ok(Self { notes, events, loading, thread: Some(thread) })
+    }
+
+    /// Opens a scene; an earlier wish that is not fulfilled yet is given up.
+    pub fn open(&self, source: Source) {
+        self.send(Note::Open(source));
+    }
+
+    /// Gives up what is being opened.
+    pub fn cancel(&self) {
+        self.send(Note::Cancel);
+    }
+
+    /// The next event, if there is one.
+    pub fn poll(&self) -> Option<LoadEvent> {
+        self.events.try_recv().ok()
+    }
+
+    /// What is being read.
+    pub fn loading(&self) -> Option<Loading> {
+        self.loading.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn send(&self, note: Note) {
+        // The thread ends only when this handle is dropped.
+        let _ = self.notes.send(note);
+    }
+}
+
+impl Drop for Loader {
+    fn drop(&mut self) {
+        self.send(Note::Close);
+        if let Some(thread) = self.thread.take() {
+            // A panic of the thread has been reported by the panic hook.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// The scene whose files are watched.
+struct Open {
+    source: Source,
+    files: Vec<PathBuf>,
+    rule: Rule,
+    /// Images that did not decode in the version that is shown.
+    replaced: Vec<String>,
+    /// The files cannot be read: what lies beside them counts too.
+    broken: bool,
+    /// Read, but with images that do not decode: taken if nothing changes until then.
+    doubtful: Option<(Loaded, Instant)>,
+}
+
+impl Open {
+    fn stamps(&self) -> Stamps {
+        if self.broken { Stamps::with_neighbours(&self.files) } else { Stamps::of(&self.files) }
+    }
+
+    /// Files have been named that were not looked at before the reading: if one was written since it began, or just
+    /// before, all are read once more.
+    fn watch_anew(&mut self, began: SystemTime, timing: Timing) {
+        let stamps = self.stamps();
+        let unsure = stamps.written_since(began.checked_sub(timing.quiet).unwrap_or(began));
+        self.rule = Rule::after(if unsure { Stamps::default() } else { stamps }, timing, Instant::now());
+    }
+}
+
+/// A reading under way.
+enum ReadingOf {
+    /// What was asked for.
+    Wish,
+    /// The open scene.
+    Again,
+}
+
+struct Worker {
+    args: SceneArgs,
+    timing: Timing,
+    notes: Sender<Note>,
+    inbox: Receiver<Note>,
+    outbox: Sender<LoadEvent>,
+    /// A note that something happened is on its way.
+    stirred: Arc<AtomicBool>,
+    loading: Arc<Mutex<Option<Loading>>>,
+    wake: Box<dyn Fn() + Send>,
+    watcher: Option<notify::RecommendedWatcher>,
+    watched: Vec<PathBuf>,
+    /// Counts readings; only the newest one's result is wanted.
+    number: u64,
+    reading: Option<ReadingOf>,
+    open: Option<Open>,
+}
+
+impl Worker {
+    fn run(mut self) {
+        let mut pause = IDLE;
+        loop {
+            match self.inbox.recv_timeout(pause) {
+                Ok(Note::Open(source)) => self.begin(source),
+                Ok(Note::Cancel) => self.cancel(),
+                Ok(Note::Read(finished)) => self.finish(*finished),
+                Ok(Note::Stirred) => self.stirred.store(false, Ordering::Release),
+                Err(RecvTimeoutError::Timeout) => {}
+                Ok(Note::Close) | Err(RecvTimeoutError::Disconnected) => return,
+            }
+            pause = self.look();
+        }
+    }
+
+    /// Looks at the files and reads them if it is time; how long to wait for the next look.
+    fn look(&mut self) -> Duration {
+        let Some(open) = &mut self.open else { return IDLE };
+        if self.reading.is_some() {
+            return IDLE;
+        }
+        let now = Instant::now();
+        let stamps = open.stamps();
+        let step = open.rule.look(stamps, now);
+        if step != Step::Rest {
+            open.doubtful = None;
+        }
+        let accepted = open.doubtful.take_if(|(_, until)| now >= *until);
+        let until_accepted = open.doubtful.as_ref().map(|(_, until)| *until - now);
+        if let Some((loaded, _)) = accepted {
+            self.show_again(loaded);
+        }
+        match step {
+            Step::Rest => until_accepted.map_or(self.timing.poll, |left| left.min(self.timing.poll)),
+            Step::Wait(left) => left,
+            Step::Read => {
+                self.read_again();
+                IDLE
+            }
+        }
+    }
+
+    fn begin(&mut self, source: Source) {
+        self.reading = Some(ReadingOf::Wish);
+        self.read(source);
+    }
+
+    fn read_again(&mut self) {
+        if let Some(open) = &self.open {
+            let source = open.source.clone();
+            self.reading = Some(ReadingOf::Again);
+            self.read(source);
+        }
+    }
+
+    fn read(&mut self, source: Source) {
+        self.number += 1;
+        self.say(Some(Loading { name: source.name(), since: Instant::now() }));
+        let (number, args, notes, began) = (self.number, self.args.clone(), self.notes.clone(), SystemTime::now());
+        let spawned = std::thread::Builder::new().name("read scene".into()).spawn({
+            let source = source.clone();
+            move || {
+                let result = session::load(&source, &args).map_err(|error| one_line(&error));
+                // The loader is gone: nobody wants the scene any more.
+                let _ = notes.send(Note::Read(Box::new(Finished { number, source, began, result })));
+            }
+        });
+        if let Err(error) = spawned {
+            self.finish(Finished { number: self.number, source, began, result: Err(error.to_string()) });
+        }
+    }
+
+    fn cancel(&mut self) {
+        if matches!(self.reading, Some(ReadingOf::Wish)) {
+            self.number += 1;
+            self.reading = None;
+            self.say(None);
+        }
+    }
+
+    fn finish(&mut self, finished: Finished) {
+        if finished.number != self.number {
+            return;
+        }
+        match self.reading.take() {
+            Some(ReadingOf::Wish) => self.finish_wish(finished),
+            Some(ReadingOf::Again) => self.finish_again(finished.began, finished.result),
+            None => {}
+        }
+        if self.reading.is_none() {
+            self.say(None);
+        }
+    }
+
+    fn finish_wish(&mut self, Finished { source, began, result, .. }: Finished) {
+        match result {
+            Ok(loaded) => {
+                let mut open = Open {
+                    source: source.clone(),
+                    files: loaded.files.clone(),
+                    rule: Rule::after(Stamps::default(), self.timing, Instant::now()),
+                    replaced: loaded.replaced_images.clone(),
+                    broken: false,
+                    doubtful: None,
+                };
+                open.watch_anew(began, self.timing);
+                self.open = Some(open);
+                self.watch();
+                self.tell(LoadEvent::Opened(source, loaded));
+            }
+            Err(text) => self.tell(LoadEvent::NotOpened(text)),
+        }
+    }
+
+    fn finish_again(&mut self, began: SystemTime, result: Result<Loaded, String>) {
+        let Some(open) = &mut self.open else { return };
+        let now = Instant::now();
+        if open.rule.read(open.stamps(), now) == Reading::Torn {
+            return;
+        }
+        match result {
+            Ok(loaded) => {
+                if open.broken || open.files != loaded.files {
+                    open.broken = false;
+                    open.files.clone_from(&loaded.files);
+                    open.watch_anew(began, self.timing);
+                }
+                match loaded.replaced_images.iter().find(|image| !open.replaced.contains(image)).cloned() {
+                    None => self.show_again(loaded),
+                    Some(text) => {
+                        open.doubtful = Some((loaded, now + self.timing.grace));
+                        self.tell(LoadEvent::Broken(text));
+                    }
+                }
+                self.watch();
+            }
+            Err(text) => {
+                if !open.broken {
+                    open.broken = true;
+                    // What lies beside the files counts from now on, and may have changed since: one more try.
+                    open.rule = Rule::after(Stamps::default(), self.timing, now);
+                }
+                self.tell(LoadEvent::Broken(text));
+            }
+        }
+    }
+
+    fn show_again(&mut self, loaded: Loaded) {
+        if let Some(open) = &mut self.open {
+            open.replaced.clone_from(&loaded.replaced_images);
+        }
+        self.tell(LoadEvent::Changed(loaded));
+    }
+
+    /// Watches the folders of the open scene's files: a file that is replaced by renaming is seen in its folder.
+    fn watch(&mut self) {
+        let Some(open) = &self.open else { return };
+        let wanted = folders(&open.files);
+        let Some(watcher) = &mut self.watcher else { return };
+        for folder in self.watched.iter().filter(|folder| !wanted.contains(folder)) {
+            // A folder that is gone cannot be unwatched, and need not be.
+            let _ = watcher.unwatch(folder);
+        }
+        for folder in wanted.iter().filter(|folder| !self.watched.contains(folder)) {
+            // What cannot be watched is looked at now and then all the same.
+            let _ = watcher.watch(folder, RecursiveMode::NonRecursive);
+        }
+        self.watched = wanted;
+    }
+
+    fn tell(&self, event: LoadEvent) {
+        // The handle is gone only while it waits for this thread to end.
+        let _ = self.outbox.send(event);
+        (self.wake)();
+    }
+
+    fn say(&self, loading: Option<Loading>) {
+        *self.loading.lock().unwrap_or_else(PoisonError::into_inner) = loading;
+        (self.wake)();
+    }
+}
