@@ -1,7 +1,7 @@
 //! `scene-report OUT_DIR [SECONDS] SCENE...`: what a person waits for and gets, by scene.
 //!
 //! For the built-in scene and each file: start to first picture (import, hierarchies, upload, kernels, a batch of 2^14
-//! samples and its presentation at 1280x720), then samples/s and segments/s in OD and FV over SECONDS each, and memory.
+//! samples and its presentation at 1280x720), edits (until a picture of 2^13 samples made after them), then samples/s and segments/s in OD and FV over SECONDS each, and memory.
 //! Writes `scenes.json` (raw numbers) and `scenes.md` (the table). Camera and background per scene are those of the
 //! reference images: camera 0 (2 for bmw and sponza), sky 1 where the scene is open.
 
@@ -16,6 +16,7 @@ use tracer::{
     gpu::{AdapterSelect, Gpu},
     provenance::Provenance,
     renderer::{FIRST_BATCH, Renderer, RendererOptions, StopCondition},
+    scene::Scene,
     view::{DebugView, ToneMap, ViewProjection, ViewSettings},
 };
 
@@ -81,7 +82,43 @@ fn measure(gpu: &Gpu, file: Option<&Path>, seconds: f64) -> Result<Value, AnyErr
         row[format!("{mode}_segments_per_s")] = per_second(statistics.segments).into();
         row[format!("{mode}_mean_path_length")] = (statistics.segments as f64 / statistics.samples as f64).into();
     }
+    let edits = edit_latency(gpu, &mut renderer, scene)?;
+    for (edit, seconds) in ["material_edit_s", "first_move_s", "move_s"].iter().zip(edits) {
+        row[*edit] = seconds.into();
+    }
     Ok(row)
+}
+
+/// Samples between an edit and the picture: in FV at least a thousand of them fall into the foveal disc.
+const EDIT_SAMPLES: u32 = 1 << 13;
+
+/// Seconds from an edit to a presented picture of samples traced after it: of a material, of an object's first move, and of
+/// its further ones; medians of five but for the first move.
+fn edit_latency(gpu: &Gpu, renderer: &mut Renderer, mut scene: Scene) -> Result<[f64; 3], AnyError> {
+    let mut shown = |edit: &dyn Fn(&mut Scene), times: usize| -> Result<f64, AnyError> {
+        let mut seconds = Vec::new();
+        for _ in 0..times {
+            edit(&mut scene);
+            let started = Instant::now();
+            renderer.set_scene(&scene)?;
+            renderer.trace(EDIT_SAMPLES)?;
+            present(gpu, renderer)?;
+            seconds.push(started.elapsed().as_secs_f64());
+        }
+        seconds.sort_by(f64::total_cmp);
+        Ok(seconds[times / 2])
+    };
+    let tint = |scene: &mut Scene| {
+        if let Some(material) = scene.materials.first_mut() {
+            Arc::make_mut(material).base_color.x *= 0.9;
+        }
+    };
+    let shift = |scene: &mut Scene| {
+        if let Some(instance) = scene.instances.first_mut() {
+            instance.world_from_mesh.translation.x += 1e-3;
+        }
+    };
+    Ok([shown(&tint, 5)?, shown(&shift, 1)?, shown(&shift, 5)?])
 }
 
 /// Presents once to a texture of 1280x720 and waits.
@@ -132,13 +169,13 @@ fn table(raw: &Value) -> String {
          -p fovea-benches --bin scene-report -- docs/reports 20 SCENE...`; raw numbers in scenes.json\n\n",
         raw["seconds_per_mode"]
     );
-    text += "| scene | triangles | import s | BVH s | upload s | kernels s | first picture s | OD k samples/s | OD k segments/s \
+    text += "| scene | triangles | import s | BVH s | upload s | kernels s | first picture s | edit of a material / first move / next moves, ms | OD k samples/s | OD k segments/s \
              | FV k samples/s | FV k segments/s | path length OD / FV | scene MB | resident MB |\n";
-    text += &format!("|{}\n", "---|".repeat(14));
+    text += &format!("|{}\n", "---|".repeat(15));
     for row in raw["scenes"].as_array().into_iter().flatten() {
         let number = |key: &str| row[key].as_f64().unwrap_or(f64::NAN);
         text += &format!(
-            "| {} | {} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} | {:.1} | {:.1} | {:.1} | {:.1} | {:.2} / {:.2} | {:.0} | {:.0} |\n",
+            "| {} | {} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} | {:.0} / {:.0} / {:.0} | {:.1} | {:.1} | {:.1} | {:.1} | {:.2} / {:.2} | {:.0} | {:.0} |\n",
             row["scene"].as_str().unwrap_or_default(),
             row["triangles"],
             number("import_s"),
@@ -146,6 +183,9 @@ fn table(raw: &Value) -> String {
             number("upload_s"),
             number("kernel_compile_s"),
             number("first_picture_s"),
+            number("material_edit_s") * 1e3,
+            number("first_move_s") * 1e3,
+            number("move_s") * 1e3,
             number("od_samples_per_s") / 1e3,
             number("od_segments_per_s") / 1e3,
             number("fv_samples_per_s") / 1e3,

@@ -258,8 +258,7 @@ impl Document {
         self.version = if unchanged {
             Arc::clone(&self.file)
         } else {
-            let made =
-                apply::apply(&self.file, &self.nodes, &self.tree, &self.edits, self.solo, &self.environments);
+            let made = apply::apply(&self.file, &self.nodes, &self.tree, &self.edits, self.solo, &self.environments);
             Arc::new(made.sharing_parts_of(&self.version))
         };
     }

@@ -27,7 +27,7 @@ use crate::{
         pipelines::{KernelError, PipelineCache},
     },
     scene::{ContentHash, Scene},
-    upload::{BlasCache, SceneOnGpu, UploadError, UploadReport},
+    upload::{SceneCache, SceneOnGpu, UploadError, UploadReport},
     view::{ViewRenderer, ViewSettings},
 };
 
@@ -166,7 +166,7 @@ pub struct Renderer {
     gpu: Gpu,
     options: RendererOptions,
     film: Film,
-    blas: BlasCache,
+    cache: SceneCache,
     scene: Option<SceneOnGpu>,
     pose: FilmPose,
     distribution: Distribution,
@@ -222,7 +222,7 @@ impl Renderer {
             gpu: gpu.clone(),
             options: *options,
             film,
-            blas: BlasCache::default(),
+            cache: SceneCache::default(),
             scene: None,
             pose: FilmPose::default(),
             distribution,
@@ -249,7 +249,7 @@ impl Renderer {
     /// # Errors
     /// When the scene does not fit the device or a kernel does not compile; the last scene then stays.
     pub fn set_scene(&mut self, scene: &Scene) -> Result<SceneReport, RenderError> {
-        let uploaded = SceneOnGpu::upload(&self.gpu, scene, &mut self.blas)?;
+        let uploaded = SceneOnGpu::upload(&self.gpu, scene, &mut self.cache)?;
         let upload = uploaded.report;
         let before = self.scene.replace(uploaded);
         let started = Instant::now();

@@ -7,24 +7,27 @@ use thiserror::Error;
 use wgpu::util::DeviceExt;
 
 use crate::{
+    bvh::NODE_BYTES,
     features::{Feature, SceneFeatures},
     gpu::Gpu,
     kernels::KernelConstants,
-    scene::Scene,
+    scene::{Environment, Scene},
 };
 
 mod albedo;
 mod alias;
+mod cache;
 mod environment;
 mod geometry;
 mod lights;
 mod materials;
+mod placement;
 mod texels;
 mod vertices;
 
 pub use alias::AliasTable;
-pub use geometry::BlasCache;
-use geometry::Geometry;
+pub use cache::SceneCache;
+use placement::Placement;
 
 /// Why a scene cannot go to the device.
 #[derive(Debug, Error)]
@@ -54,12 +57,14 @@ pub enum UploadError {
 /// What an upload took and made.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct UploadReport {
-    /// Seconds to build the hierarchies.
+    /// Seconds to build the hierarchies of meshes and to encode and hand over their triangles.
     pub bvh_build_secs: f64,
     /// Seconds to encode and hand over the rest.
     pub upload_secs: f64,
     /// Bytes of buffers and textures on the device.
     pub device_bytes: u64,
+    /// Bytes of those that were handed over now; the rest was there since an earlier version of the scene.
+    pub uploaded_bytes: u64,
     /// Triangles in the hierarchies, each mesh once.
     pub triangles: u64,
     /// Lights in the alias table.
@@ -103,7 +108,10 @@ pub struct SceneBindings {
 /// Uploads buffers and keeps count.
 struct Uploader<'a> {
     gpu: &'a Gpu,
-    bytes: u64,
+    /// Of the scene.
+    device_bytes: u64,
+    /// Of those, new.
+    uploaded_bytes: u64,
 }
 
 impl Uploader<'_> {
@@ -112,17 +120,56 @@ impl Uploader<'_> {
         const EMPTY: [u8; 128] = [0; 128];
         let contents: &[u8] = if data.is_empty() { &EMPTY } else { bytemuck::cast_slice(data) };
         let bytes = contents.len() as u64;
-        let limit = self.gpu.largest_binding();
-        if bytes > limit {
-            let adapter = self.gpu.info().name.clone();
-            return Err(UploadError::TooLarge { what, bytes, limit, adapter });
-        }
-        self.bytes += bytes;
-        Ok(self.gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        self.check(what, bytes)?;
+        self.count_new(bytes);
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+        let descriptor = wgpu::util::BufferInitDescriptor { label: Some(what), contents, usage };
+        Ok(self.gpu.device.create_buffer_init(&descriptor))
+    }
+
+    /// The `head` bytes at the start of a buffer, with more after them.
+    fn appended<T: bytemuck::NoUninit>(
+        &mut self,
+        what: &'static str,
+        (start, head): (&wgpu::Buffer, u64),
+        tail: &[T],
+    ) -> Result<wgpu::Buffer, UploadError> {
+        let tail: &[u8] = bytemuck::cast_slice(tail);
+        let size = head + tail.len() as u64;
+        self.check(what, size)?;
+        self.count_new(tail.len() as u64);
+        let buffer = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(what),
-            contents,
+            size,
             usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-        }))
+            mapped_at_creation: false,
+        });
+        self.gpu.queue.write_buffer(&buffer, head, tail);
+        if head > 0 {
+            let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+            encoder.copy_buffer_to_buffer(start, 0, &buffer, 0, head);
+            self.gpu.queue.submit([encoder.finish()]);
+        }
+        Ok(buffer)
+    }
+
+    fn check(&self, what: &'static str, bytes: u64) -> Result<(), UploadError> {
+        let limit = self.gpu.largest_binding();
+        if bytes <= limit {
+            return Ok(());
+        }
+        Err(UploadError::TooLarge { what, bytes, limit, adapter: self.gpu.info().name.clone() })
+    }
+
+    fn count_new(&mut self, bytes: u64) {
+        self.device_bytes += bytes;
+        self.uploaded_bytes += bytes;
+    }
+
+    /// Counts what may have been on the device already.
+    fn count(&mut self, bytes: u64, is_new: bool) {
+        self.device_bytes += bytes;
+        self.uploaded_bytes += if is_new { bytes } else { 0 };
     }
 }
 
@@ -148,68 +195,88 @@ fn upload_image(gpu: &Gpu, label: &str, [width, height]: [u32; 2], texels: &[[f3
 }
 
 impl SceneOnGpu {
-    /// Builds what is missing in `cache`, encodes the scene and uploads it.
+    /// Builds and uploads what is not in `cache` since an earlier version of the scene.
     ///
     /// # Errors
     /// When a part exceeds the adapter's limits or its memory.
-    pub fn upload(gpu: &Gpu, scene: &Scene, cache: &mut BlasCache) -> Result<Self, UploadError> {
-        let started = Instant::now();
-        let mut geometry = Geometry::build(scene, cache);
-        let bvh_build_secs = started.elapsed().as_secs_f64();
-
+    pub fn upload(gpu: &Gpu, scene: &Scene, cache: &mut SceneCache) -> Result<Self, UploadError> {
         let started = Instant::now();
         let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-        let mut uploader = Uploader { gpu, bytes: 0 };
-        let light_table = lights::LightTable::build(scene, &mut geometry);
-        let (texels, offsets) = texels::TexelHeap::upload(gpu, &scene.textures, &mut uploader.bytes)?;
-        let (materials, slots) = materials::encode(scene, &offsets);
-        let environment = environment::EnvironmentOnGpu::build(gpu, &scene.environment, &mut uploader.bytes)?;
+        let mut uploader = Uploader { gpu, device_bytes: 0, uploaded_bytes: 0 };
+        let split = cache.split(scene);
+        let shapes = cache.shapes(scene, &split, &mut uploader)?;
+        let shapes_secs = started.elapsed().as_secs_f64();
+        let mut placement = Placement::of(scene, &split, &shapes.shapes, shapes.node_count);
+        let light_table = lights::LightTable::build(scene, &shapes.shapes, &mut placement);
+        let texels = cache.texels(scene, &mut uploader)?;
+        let (materials, slots) = materials::encode(scene, &texels.offsets);
+        let environment = cache.environment(&scene.environment, &mut uploader)?;
         let features = SceneFeatures::of(scene);
-        let lobe_tables = albedo::upload(gpu, features, &mut uploader.bytes);
+        let lobe_tables = cache.lobe_tables(features, &mut uploader);
+        let [shape_nodes, positions, triangles, vertices] = shapes.buffers.clone();
+        let nodes = if placement.nodes.is_empty() {
+            shape_nodes
+        } else {
+            let head = u64::from(shapes.node_count) * NODE_BYTES as u64;
+            uploader.appended("hierarchy nodes", (&shape_nodes, head), &placement.nodes)?
+        };
         let buffers = [
-            uploader.storage("hierarchy nodes", &geometry.nodes)?,
-            uploader.storage("triangle positions", &geometry.positions)?,
-            uploader.storage("triangles", &geometry.triangles)?,
-            uploader.storage("vertices", &geometry.vertices)?,
-            uploader.storage("instances", &geometry.instances)?,
-            uploader.storage("materials", &materials)?,
-            uploader.storage("texture slots", &slots)?,
-            uploader.storage("lights", &light_table.lights)?,
+            nodes,
+            positions,
+            triangles,
+            vertices,
+            cache.table("instances", &placement.instances, &mut uploader)?,
+            cache.table("materials", &materials, &mut uploader)?,
+            cache.table("texture slots", &slots, &mut uploader)?,
+            cache.table("lights", &light_table.lights, &mut uploader)?,
         ];
         if pollster::block_on(scope.pop()).is_some() {
-            return Err(UploadError::OutOfMemory { what: "buffers and textures", bytes: uploader.bytes });
+            return Err(UploadError::OutOfMemory { what: "buffers and textures", bytes: uploader.device_bytes });
         }
 
         let light_count = light_table.lights.len() as u32;
         let has_image = environment.cells_size[0] > 0;
+        let (radiance, rotation_turns, brightest) = match &scene.environment {
+            Environment::Constant(radiance) => (*radiance, 0.0, radiance.max_element()),
+            Environment::Image { rotation_deg, intensity, .. } => {
+                (Vec3::splat(*intensity), rotation_deg / 360.0, environment.brightest * intensity)
+            }
+        };
         Ok(Self {
             features: features
                 .with(Feature::Lights, light_count > 0)
-                .with(Feature::Instances, !geometry.is_single_level),
+                .with(Feature::Instances, !placement.is_single_level),
             constants: KernelConstants {
-                stack_size: geometry.stack_size,
-                root_node: geometry.root,
+                stack_size: placement.stack_size,
+                root_node: placement.root,
                 environment_cells: environment.cells_size,
             },
             bindings: SceneBindings {
                 buffers,
-                textures: [texels.srgb, texels.linear, environment.image, environment.cells, lobe_tables],
+                textures: [
+                    texels.srgb.clone(),
+                    texels.linear.clone(),
+                    environment.image.clone(),
+                    environment.cells.clone(),
+                    lobe_tables,
+                ],
             },
-            sources: geometry.sources,
+            sources: placement.sources,
             light_count,
             environment_probability: match (has_image, light_count > 0) {
                 (true, true) => 0.5,
                 (true, false) => 1.0,
                 (false, _) => 0.0,
             },
-            environment_radiance: environment.radiance,
-            environment_rotation_turns: environment.rotation_turns,
-            brightest_radiance: environment.brightest.max(light_table.brightest).max(1.0),
+            environment_radiance: radiance,
+            environment_rotation_turns: rotation_turns,
+            brightest_radiance: brightest.max(light_table.brightest).max(1.0),
             report: UploadReport {
-                bvh_build_secs,
-                upload_secs: started.elapsed().as_secs_f64(),
-                device_bytes: uploader.bytes,
-                triangles: geometry.triangles.len() as u64,
+                bvh_build_secs: shapes_secs,
+                upload_secs: started.elapsed().as_secs_f64() - shapes_secs,
+                device_bytes: uploader.device_bytes,
+                uploaded_bytes: uploader.uploaded_bytes,
+                triangles: shapes.shapes.triangles.len() as u64,
                 lights: light_count,
             },
         })

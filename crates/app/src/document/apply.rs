@@ -39,8 +39,7 @@ impl Move {
         let linear = world_from_node.matrix3;
         let inverse = linear.inverse();
         // A flattened node has no axes of its own to scale along.
-        let scaled =
-            if inverse.is_finite() { linear * Mat3A::from_diagonal(scale) * inverse } else { Mat3A::IDENTITY };
+        let scaled = if inverse.is_finite() { linear * Mat3A::from_diagonal(scale) * inverse } else { Mat3A::IDENTITY };
         let turned = Mat3A::from_quat(rotation) * scaled;
         let origin = world_from_node.translation;
         Affine3A { matrix3: turned, translation: origin + glam::Vec3A::from(translation) - turned * origin }

@@ -73,8 +73,7 @@ impl Document {
     /// One line, when the file cannot be read or is no file of edits.
     pub fn load_edits(&mut self, path: &Path) -> Result<Vec<String>, String> {
         let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
-        let (edits, left_out) =
-            parse(&text, &self.names).map_err(|reason| format!("{}: {reason}", path.display()))?;
+        let (edits, left_out) = parse(&text, &self.names).map_err(|reason| format!("{}: {reason}", path.display()))?;
         self.take_saved(edits);
         Ok(left_out)
     }
@@ -186,12 +185,7 @@ fn node_edit(entry: &Json) -> NodeEdit {
 }
 
 /// The entries of a list that name a part, with its place.
-fn entries<'a>(
-    list: &'a Json,
-    names: &[PartName],
-    kind: &str,
-    left_out: &mut Vec<String>,
-) -> Vec<(&'a Json, u32)> {
+fn entries<'a>(list: &'a Json, names: &[PartName], kind: &str, left_out: &mut Vec<String>) -> Vec<(&'a Json, u32)> {
     let mut found = Vec::new();
     for entry in list.as_array().into_iter().flatten() {
         let name = entry["name"].as_str().unwrap_or_default();

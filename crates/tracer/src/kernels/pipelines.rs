@@ -69,7 +69,7 @@ impl Pipeline {
         let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let descriptor =
             wgpu::ShaderModuleDescriptor { label: Some(&label), source: wgpu::ShaderSource::Wgsl(text.into()) };
-        // Clamping every index and counting every loop takes a fifth of the traversal's time on lavapipe (docs/reports/traversal.md).
+        // Clamping every index and counting every loop takes a fifth of the traversal's time on lavapipe (docs/ARCHITECTURE.md).
         let checks = wgpu::ShaderRuntimeChecks {
             bounds_checks: false,
             force_loop_bounding: false,

@@ -40,11 +40,13 @@ const LEAST_COSINE: f64 = 1e-4;
 /// Square of `LEAST_SHEEN_ROUGHNESS` of `shaders/shading/sheen.wesl`.
 const LEAST_SHEEN_ALPHA: f64 = 0.01;
 
+/// What the tables depend on.
+pub(super) const TABLE_FEATURES: [Feature; 3] = [Feature::Specular, Feature::Clearcoat, Feature::Sheen];
+
 /// Width and texels of the table that the features need; one texel when they need none.
-pub(super) fn upload(gpu: &Gpu, features: SceneFeatures, bytes: &mut u64) -> wgpu::TextureView {
-    let layered = [Feature::Specular, Feature::Clearcoat, Feature::Sheen];
+pub(super) fn upload(gpu: &Gpu, features: SceneFeatures) -> (wgpu::TextureView, u64) {
     let mut texels = Vec::new();
-    if layered.iter().any(|&feature| features.contains(feature)) {
+    if TABLE_FEATURES.iter().any(|&feature| features.contains(feature)) {
         texels.extend(in_pairs(reflection_table(), ALBEDO_COLUMNS));
         let sheen = if features.contains(Feature::Sheen) { sheen_table() } else { &[] };
         texels.extend(in_pairs(sheen, ALBEDO_COLUMNS));
@@ -59,8 +61,7 @@ pub(super) fn upload(gpu: &Gpu, features: SceneFeatures, bytes: &mut u64) -> wgp
     if texels.is_empty() {
         (texels, size) = (vec![[0.0; 4]], [1, 1]);
     }
-    *bytes += texels.len() as u64 * 16;
-    super::upload_image(gpu, "lobe tables", size, &texels)
+    (super::upload_image(gpu, "lobe tables", size, &texels), texels.len() as u64 * 16)
 }
 
 /// Each texel holds an entry and its neighbour along the row: interpolation needs half as many loads.

@@ -5,15 +5,13 @@ use std::f64::consts::PI;
 use glam::Vec3;
 
 use super::{AliasTable, UploadError, lights::luminance, upload_image};
-use crate::{
-    gpu::Gpu,
-    scene::{Environment, EnvironmentImage},
-};
+use crate::{gpu::Gpu, scene::EnvironmentImage};
 
 /// Cells of the importance grid at most, along x and y.
 const MOST_CELLS: [u32; 2] = [1024, 512];
 
-/// What the kernels see of an environment.
+/// An environment image and its grid on the device.
+#[derive(Debug)]
 pub struct EnvironmentOnGpu {
     /// The image, or one black texel.
     pub image: wgpu::TextureView,
@@ -21,49 +19,38 @@ pub struct EnvironmentOnGpu {
     pub cells: wgpu::TextureView,
     /// Its size; zero for a constant environment.
     pub cells_size: [u32; 2],
-    /// Constant radiance, or the factor of the image.
-    pub radiance: Vec3,
-    /// Turns to the right.
-    pub rotation_turns: f32,
-    /// Largest radiance.
+    /// Largest radiance of the image.
     pub brightest: f32,
+    /// Of both.
+    pub bytes: u64,
 }
 
 impl EnvironmentOnGpu {
-    /// Uploads the image and builds the grid. Adds the bytes to `bytes`.
-    pub fn build(gpu: &Gpu, environment: &Environment, bytes: &mut u64) -> Result<Self, UploadError> {
-        Ok(match environment {
-            Environment::Constant(radiance) => Self {
-                image: upload_image(gpu, "environment", [1, 1], &[[0.0; 4]]),
-                cells: upload_image(gpu, "environment", [1, 1], &[[0.0; 4]]),
-                cells_size: [0; 2],
-                radiance: *radiance,
-                rotation_turns: 0.0,
-                brightest: radiance.max_element(),
-            },
-            Environment::Image { image, rotation_deg, intensity } => {
-                let side = u64::from(gpu.device.limits().max_texture_dimension_2d);
-                if u64::from(image.width.max(image.height)) > side {
-                    return Err(UploadError::TooLarge {
-                        what: "environment image",
-                        bytes: image.pixels.len() as u64 * 16,
-                        limit: side * side * 16,
-                        adapter: gpu.info().name.clone(),
-                    });
-                }
-                let texels: Vec<[f32; 4]> = image.pixels.iter().map(|p| [p[0], p[1], p[2], 1.0]).collect();
-                let (cells, cells_size) = importance_grid(image);
-                *bytes += (texels.len() + cells.len()) as u64 * 16;
-                let brightest = image.pixels.iter().flatten().fold(0.0f32, |a, &b| a.max(b)) * intensity;
-                Self {
-                    image: upload_image(gpu, "environment image", [image.width, image.height], &texels),
-                    cells: upload_image(gpu, "environment grid", cells_size, &cells),
-                    cells_size,
-                    radiance: Vec3::splat(*intensity),
-                    rotation_turns: rotation_deg / 360.0,
-                    brightest,
-                }
-            }
+    /// For a constant environment: nothing but what the bindings need.
+    pub fn constant(gpu: &Gpu) -> Self {
+        let texel = || upload_image(gpu, "environment", [1, 1], &[[0.0; 4]]);
+        Self { image: texel(), cells: texel(), cells_size: [0; 2], brightest: 0.0, bytes: 32 }
+    }
+
+    /// Uploads the image and builds the grid.
+    pub fn of(gpu: &Gpu, image: &EnvironmentImage) -> Result<Self, UploadError> {
+        let side = u64::from(gpu.device.limits().max_texture_dimension_2d);
+        if u64::from(image.width.max(image.height)) > side {
+            return Err(UploadError::TooLarge {
+                what: "environment image",
+                bytes: image.pixels.len() as u64 * 16,
+                limit: side * side * 16,
+                adapter: gpu.info().name.clone(),
+            });
+        }
+        let texels: Vec<[f32; 4]> = image.pixels.iter().map(|p| [p[0], p[1], p[2], 1.0]).collect();
+        let (cells, cells_size) = importance_grid(image);
+        Ok(Self {
+            image: upload_image(gpu, "environment image", [image.width, image.height], &texels),
+            cells: upload_image(gpu, "environment grid", cells_size, &cells),
+            cells_size,
+            brightest: image.pixels.iter().flatten().fold(0.0f32, |a, &b| a.max(b)),
+            bytes: (texels.len() + cells.len()) as u64 * 16,
         })
     }
 }

@@ -4,7 +4,7 @@ use std::collections::{HashMap, hash_map::Entry};
 
 use glam::Vec3;
 
-use super::{AliasTable, geometry::Geometry};
+use super::{AliasTable, geometry::Shapes, placement::Placement};
 use crate::{
     kernels::layout::{self, codes},
     scene::{PunctualKind, PunctualLight, Scene, Texture},
@@ -19,20 +19,20 @@ pub(super) struct LightTable {
 }
 
 impl LightTable {
-    /// Builds the table of a scene's visible lights and enters each instance's first light into `geometry`.
-    pub(super) fn build(scene: &Scene, geometry: &mut Geometry) -> Self {
+    /// Builds the table of a scene's visible lights and enters each instance's first light into `placement`.
+    pub(super) fn build(scene: &Scene, shapes: &Shapes, placement: &mut Placement) -> Self {
         let mut lights = Vec::new();
         let mut powers = Vec::new();
         let mut twins = Twins::default();
         let mut brightest: f32 = 0.0;
-        for (index, source) in geometry.sources.iter().enumerate() {
+        for (index, source) in placement.sources.iter().enumerate() {
             let Some(source) = *source else { continue };
             let instance = &scene.instances[source as usize];
             let material = &scene.materials[instance.material as usize];
             if material.emission.max_element() <= 0.0 || material.unlit {
                 continue;
             }
-            geometry.instances[index].first_light = lights.len() as u32;
+            placement.instances[index].first_light = lights.len() as u32;
             brightest = brightest.max(material.emission.max_element());
             let mean = material
                 .emissive_texture
@@ -64,7 +64,7 @@ impl LightTable {
             }
         }
         if scene.materials.iter().any(|m| m.emissive_texture.is_some()) {
-            enter_triangles(geometry, &mut lights);
+            enter_triangles(shapes, placement, &mut lights);
         }
         let reach = scene.bounds().map_or(1.0, |(low, high)| f64::from((high - low).length()) * 0.5);
         let (discs, others): (Vec<_>, Vec<_>) =
@@ -124,17 +124,17 @@ impl Twins {
 }
 
 /// Tells each light the triangle whose texture coordinates it has. A mesh that is placed often lends its copies one.
-fn enter_triangles(geometry: &Geometry, lights: &mut [layout::Light]) {
+fn enter_triangles(shapes: &Shapes, placement: &Placement, lights: &mut [layout::Light]) {
     let mut entries: Vec<(u32, u32)> = Vec::new();
-    for (index, instance) in geometry.instances.iter().enumerate() {
+    for (index, instance) in placement.instances.iter().enumerate() {
         if instance.root_node != codes::NONE && instance.first_light != codes::NONE {
             entries.push((instance.root_node, index as u32));
         }
     }
-    for (slot, &[first, _, _, number]) in geometry.triangles.iter().enumerate() {
-        let part = geometry.vertices[first as usize].part;
+    for (slot, &[first, _, _, number]) in shapes.triangles.iter().enumerate() {
+        let part = shapes.vertices[first as usize].part;
         if part != codes::NONE {
-            let first_light = geometry.instances[part as usize].first_light;
+            let first_light = placement.instances[part as usize].first_light;
             if first_light != codes::NONE {
                 let number = number & !codes::TRIANGLE_ALPHA;
                 lights[(first_light + number) as usize].triangle = slot as u32;
@@ -142,8 +142,8 @@ fn enter_triangles(geometry: &Geometry, lights: &mut [layout::Light]) {
         }
     }
     for (root, index) in entries {
-        let first_light = geometry.instances[index as usize].first_light;
-        for (number, slot) in geometry.slots_below(root) {
+        let first_light = placement.instances[index as usize].first_light;
+        for (number, slot) in shapes.slots_below(root) {
             lights[(first_light + number) as usize].triangle = slot;
         }
     }

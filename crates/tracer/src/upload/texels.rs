@@ -13,20 +13,25 @@ use crate::{
 const PAGE: u32 = 1 << TEXEL_PAGE_BITS;
 
 /// The two page stacks.
+#[derive(Debug)]
 pub struct TexelHeap {
     /// Decodes sRGB on look-up.
     pub srgb: wgpu::TextureView,
     /// Linear values.
     pub linear: wgpu::TextureView,
+    /// First texel of each texture.
+    pub offsets: Vec<u32>,
+    /// Of both.
+    pub bytes: u64,
 }
 
 impl TexelHeap {
-    /// Uploads textures; returns the heap and each texture's first texel. Adds the bytes to `bytes`.
-    pub fn upload(gpu: &Gpu, textures: &[Arc<Texture>], bytes: &mut u64) -> Result<(Self, Vec<u32>), UploadError> {
-        let mut offsets = vec![0; textures.len()];
-        let srgb = stack(gpu, textures, TexelEncoding::Srgb, &mut offsets, bytes)?;
-        let linear = stack(gpu, textures, TexelEncoding::Linear, &mut offsets, bytes)?;
-        Ok((Self { srgb, linear }, offsets))
+    /// Uploads textures.
+    pub fn upload(gpu: &Gpu, textures: &[Arc<Texture>]) -> Result<Self, UploadError> {
+        let (mut offsets, mut bytes) = (vec![0; textures.len()], 0);
+        let srgb = stack(gpu, textures, TexelEncoding::Srgb, &mut offsets, &mut bytes)?;
+        let linear = stack(gpu, textures, TexelEncoding::Linear, &mut offsets, &mut bytes)?;
+        Ok(Self { srgb, linear, offsets, bytes })
     }
 }
 
