@@ -73,12 +73,18 @@ pub struct PreviewArgs {
     /// Go on with a film of this scene that fovea wrote, from where it was taken
     #[arg(long, value_name = "FILM.exr")]
     pub resume: Option<PathBuf>,
+    /// Send the picture to the image viewer tev as it converges
+    #[arg(long, value_name = "HOST:PORT")]
+    pub tev: Option<TevAddress>,
     /// The window's size when it opens, pixels
     #[arg(long, default_value = "1280x720", value_name = "WxH")]
     pub window: SizePx,
     /// Memory that the film may take, MiB; more gives a finer panorama
     #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(16..=65536), value_name = "MIB")]
     pub film_memory: u32,
+    /// Destroy the graphics device this many seconds after the window opened (for tests)
+    #[arg(long, hide = true, value_parser = values::positive_seconds, value_name = "SECONDS")]
+    pub lose_device_after: Option<f64>,
     /// Save what the window shows after this many seconds, then close it (for tests and documentation)
     #[arg(
         long, hide = true,

@@ -20,7 +20,7 @@ pub mod sampler;
 /// Whatever keeps the command from doing what it was asked for.
 pub fn run(cli: Cli) -> anyhow::Result<()> {
     match cli.command {
-        None => crate::preview::run(cli.preview),
+        None => crate::preview::run(&cli.preview),
         Some(Command::Render(args)) => render::run(&args),
         Some(Command::Merge(args)) => merge::run(&args),
         Some(Command::Info(args)) => info::run(&args),

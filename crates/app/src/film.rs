@@ -37,9 +37,11 @@ impl FilmPlan {
 
     /// Whether a view can be shown from this film without another being clearly better.
     pub fn suits(&self, view: &View, size_px: Vec2) -> bool {
-        if self.coarseness(view, size_px) > TOLERABLE_COARSENESS {
-            return false;
-        }
+        self.coarseness(view, size_px) <= TOLERABLE_COARSENESS && self.covers(view)
+    }
+
+    /// Whether the film reaches to the corners of a view.
+    pub fn covers(&self, view: &View) -> bool {
         let FilmMapping::Perspective { half_extent } = self.options.mapping else { return true };
         let corners = [Vec2::ONE, Vec2::new(-1.0, 1.0), Vec2::NEG_ONE, Vec2::new(1.0, -1.0)];
         corners.into_iter().all(|corner| {

@@ -1,6 +1,10 @@
 //! The preview window.
 
-use std::sync::{Arc, PoisonError};
+use std::cell::RefCell;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::rc::Rc;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, anyhow};
 use egui_wgpu::{WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew};
@@ -9,6 +13,7 @@ use tracer::gpu::{AdapterSelect, Gpu};
 use crate::cli::PreviewArgs;
 use crate::commands::print_json;
 use crate::gaze::hub::GazeHub;
+use crate::output::exr;
 use crate::reload::Loader;
 use crate::reload::rule::Timing;
 use crate::session::{self, Source};
@@ -22,6 +27,7 @@ pub mod engine;
 pub mod gaze;
 pub mod gaze_control;
 pub mod gaze_panel;
+pub mod keeper;
 pub mod navigation;
 pub mod open_scene;
 pub mod overlay;
@@ -35,16 +41,91 @@ pub mod window;
 ///
 /// # Errors
 /// No display, no usable adapter, or a scene that cannot be opened.
-pub fn run(args: PreviewArgs) -> anyhow::Result<()> {
+pub fn run(args: &PreviewArgs) -> anyhow::Result<()> {
     let source = Source::from(args.scene.scene.as_deref());
     if let Source::File(path) = &source {
         // A window that opens only to say that the file is missing helps nobody.
         std::fs::File::open(path).with_context(|| path.display().to_string())?;
     }
+    let resumed = args.resume.as_deref().map(exr::read).transpose()?;
     let gaze = Arc::new(GazeHub::new(&args.gaze.sources, args.gaze.accuracy_deg)?);
-    let select = args.scene.adapter.clone().map_or(AdapterSelect::Auto, AdapterSelect::Named);
     let outcome = Outcome::default();
-    let options = eframe::NativeOptions {
+    let screenshot = args
+        .screenshot_after
+        .zip(args.screenshot.clone())
+        .map(|(after, path)| Screenshot::new(after, path, Arc::clone(&outcome)));
+    let repaint = Repaint::default();
+    let repaints = repaint.clone();
+    let first = |engine, adapter| -> anyhow::Result<Window> {
+        let loader = Loader::start(args.scene.clone(), Timing::default(), move || repaints.request())?;
+        loader.open(source.clone());
+        let gaze = GazeControl::new(Arc::clone(&gaze), args);
+        let mut window = Window::new(engine, loader, adapter, args, gaze, screenshot);
+        if let Some(file) = resumed {
+            window.resume(file.film);
+        }
+        Ok(window)
+    };
+    // What a person has done outlives the device: the window moves to another when its own is lost.
+    let (window, mut first) = (Rc::new(RefCell::new(None)), Some(first));
+    let mut losses = Losses::default();
+    let mut lose_at = args.lose_device_after.map(|secs| Instant::now() + Duration::from_secs_f64(secs));
+    loop {
+        let (shown, first) = (Rc::clone(&window), first.take());
+        let creator: eframe::AppCreator<'_> = Box::new(|creation| {
+            theme::apply(&creation.egui_ctx);
+            repaint.aim_at(&creation.egui_ctx);
+            let state = creation.wgpu_render_state.as_ref().context("the window has no graphics device")?;
+            let gpu = Gpu::adopt(state.adapter.clone(), state.device.clone(), state.queue.clone())?;
+            let adapter = gpu.info().name.clone();
+            let repaints = repaint.clone();
+            let engine = Engine::start(gpu, args, Arc::clone(&gaze), move || repaints.request())?;
+            match (&mut *shown.borrow_mut(), first) {
+                (Some(window), _) => Window::renew(window, engine, adapter),
+                (none, Some(first)) => *none = Some(first(engine, adapter)?),
+                (None, None) => return Err("the window did not open".into()),
+            }
+            Ok(Box::new(Shell { window: shown, lose_at }))
+        });
+        // Between the frame that does not know of a loss yet and its painting, egui's painter panics.
+        let run = || eframe::run_native("fovea", native_options(args, &source), creator);
+        let outcome = catch_unwind(AssertUnwindSafe(run));
+        let is_lost = || window.borrow().as_ref().is_some_and(Window::is_lost);
+        let lost = match outcome {
+            Ok(closed) => {
+                closed.map_err(explain)?;
+                is_lost()
+            }
+            Err(panic) if !noticed(is_lost) => resume_unwind(panic),
+            Err(_) => true,
+        };
+        if !lost {
+            break;
+        }
+        losses.count(Instant::now())?;
+        lose_at = None;
+    }
+    let outcome = outcome.lock().unwrap_or_else(PoisonError::into_inner).take();
+    match outcome {
+        Some(figures) => print_json(&figures?),
+        None => Ok(()),
+    }
+}
+
+/// Whether the loss of the device becomes known within a second.
+fn noticed(is_lost: impl Fn() -> bool) -> bool {
+    let pause = Duration::from_millis(50);
+    (0..20).any(|_| {
+        is_lost() || {
+            std::thread::sleep(pause);
+            false
+        }
+    })
+}
+
+fn native_options(args: &PreviewArgs, source: &Source) -> eframe::NativeOptions {
+    let select = args.scene.adapter.clone().map_or(AdapterSelect::Auto, AdapterSelect::Named);
+    eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title(format!("{} - Fovea", source.name()))
             .with_app_id("fovea")
@@ -54,29 +135,60 @@ pub fn run(args: PreviewArgs) -> anyhow::Result<()> {
         wgpu_options: WgpuConfiguration { wgpu_setup: setup(select), ..WgpuConfiguration::default() },
         persist_window: false,
         ..eframe::NativeOptions::default()
-    };
-    let screenshot = args
-        .screenshot_after
-        .zip(args.screenshot.clone())
-        .map(|(after, path)| Screenshot::new(after, path, Arc::clone(&outcome)));
-    let creator: eframe::AppCreator<'_> = Box::new(move |creation| {
-        theme::apply(&creation.egui_ctx);
-        let state = creation.wgpu_render_state.as_ref().context("the window has no graphics device")?;
-        let gpu = Gpu::adopt(state.adapter.clone(), state.device.clone(), state.queue.clone())?;
-        let adapter = gpu.info().name.clone();
-        let ctx = creation.egui_ctx.clone();
-        let engine = Engine::start(gpu, &args, Arc::clone(&gaze), move || ctx.request_repaint())?;
-        let ctx = creation.egui_ctx.clone();
-        let loader = Loader::start(args.scene.clone(), Timing::default(), move || ctx.request_repaint())?;
-        loader.open(source);
-        let gaze = GazeControl::new(gaze, &args);
-        Ok(Box::new(Window::new(engine, loader, adapter, &args, gaze, screenshot)))
-    });
-    eframe::run_native("fovea", options, creator).map_err(explain)?;
-    let outcome = outcome.lock().unwrap_or_else(PoisonError::into_inner).take();
-    match outcome {
-        Some(figures) => print_json(&figures?),
-        None => Ok(()),
+    }
+}
+
+/// Shows a window that outlives it.
+struct Shell {
+    window: Rc<RefCell<Option<Window>>>,
+    /// When a test wants the device to be lost.
+    lose_at: Option<Instant>,
+}
+
+impl eframe::App for Shell {
+    fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
+        if self.lose_at.is_some_and(|at| at <= Instant::now())
+            && let Some(state) = frame.wgpu_render_state()
+        {
+            self.lose_at = None;
+            state.device.destroy();
+        }
+        if let Some(window) = &mut *self.window.borrow_mut() {
+            window.ui(ui, frame);
+        }
+    }
+
+    fn clear_color(&self, visuals: &egui::Visuals) -> [f32; 4] {
+        self.window.borrow().as_ref().map_or([0.0; 4], |window| window.clear_color(visuals))
+    }
+}
+
+/// Asks whichever window is open at the moment to be drawn again.
+#[derive(Clone, Default)]
+struct Repaint(Arc<Mutex<Option<egui::Context>>>);
+
+impl Repaint {
+    fn aim_at(&self, ctx: &egui::Context) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(ctx.clone());
+    }
+
+    fn request(&self) {
+        if let Some(ctx) = &*self.0.lock().unwrap_or_else(PoisonError::into_inner) {
+            ctx.request_repaint();
+        }
+    }
+}
+
+/// How often the device was lost of late: a driver that fails at once, time and again, is not tried for ever.
+#[derive(Default)]
+struct Losses(Vec<Instant>);
+
+impl Losses {
+    fn count(&mut self, now: Instant) -> anyhow::Result<()> {
+        self.0.retain(|at| now.duration_since(*at) < Duration::from_secs(60));
+        self.0.push(now);
+        anyhow::ensure!(self.0.len() <= 3, "the graphics device was lost {} times within a minute", self.0.len());
+        Ok(())
     }
 }
 

@@ -84,7 +84,7 @@ pub fn read_texture(gpu: &Gpu, texture: &wgpu::Texture) -> anyhow::Result<Vec<[u
         // The receiver waits just below; it is gone only when polling failed.
         let _ = sender.send(result);
     });
-    gpu.wait().context("the graphics device was lost")?;
+    gpu.wait()?;
     receiver.recv().context("the graphics device was lost")?.context("the picture could not be read back")?;
     let mapped = staging.slice(..).get_mapped_range().context("the picture could not be read back")?;
     let rows = mapped.chunks_exact(padded as usize);

@@ -7,6 +7,8 @@ use fovea_app::output::exr;
 use support::{Folder, SQUARE, fovea, json, refuses, text};
 use tracer::film::FilmPixel;
 
+#[path = "films/lost.rs"]
+mod lost;
 mod support;
 #[path = "films/tev.rs"]
 mod tev;

@@ -171,3 +171,50 @@ fn a_trackers_gaze_reaches_the_next_batch_wherever_the_pointer_is() {
     assert!(ms("age_ms") > 0.0, "{gaze}");
     eprintln!("density ratio {ratio:.2}, {figures}");
 }
+
+#[test]
+fn a_window_whose_device_is_lost_opens_again_and_its_film_goes_on() {
+    let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    let Some(display) = Display::start() else {
+        eprintln!("SKIP a_window_whose_device_is_lost_opens_again_and_its_film_goes_on: Xvfb or xdotool is missing");
+        return;
+    };
+    // Long enough for the film to have been kept, also where starting takes long.
+    let (_, figures) = display.session(26, &["--lose-device-after", "18", "--film-memory", "64"], |_| {});
+    let number = |key: &str| figures[key].as_u64().unwrap();
+    assert!(number("taken_over") > 0, "nothing was kept, or the device was never lost: {figures}");
+    assert!(number("samples") > number("taken_over"), "{figures}");
+}
+
+#[test]
+fn a_window_goes_on_with_a_film_and_shows_it_to_a_viewer() {
+    let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    let Some(display) = Display::start() else {
+        eprintln!("SKIP a_window_goes_on_with_a_film_and_shows_it_to_a_viewer: Xvfb or xdotool is missing");
+        return;
+    };
+    let film = std::env::temp_dir().join(format!("fovea-window-film-{}.exr", std::process::id()));
+    let rendered = Command::new(env!("CARGO_BIN_EXE_fovea"))
+        .args(["render", "-o", film.to_str().unwrap(), "--film", "equirect:512x256", "--samples", "1000000"])
+        .args(["--max-bounces", "0"])
+        .output()
+        .unwrap();
+    assert!(rendered.status.success(), "{}", String::from_utf8_lossy(&rendered.stderr));
+    let viewer = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = viewer.local_addr().unwrap().to_string();
+    let received = std::thread::spawn(move || {
+        let mut bytes = Vec::new();
+        // The window may close in the middle of a packet.
+        let _ = std::io::Read::read_to_end(&mut viewer.accept().unwrap().0, &mut bytes);
+        bytes
+    });
+    let (_, figures) = display.session(4, &["--resume", film.to_str().unwrap(), "--tev", &address], |_| {});
+    std::fs::remove_file(film).unwrap();
+    // The film is coarse for this window, and stays all the same.
+    assert_eq!(figures["film"], "512x256", "{figures}");
+    assert_eq!(figures["taken_over"], 1_000_000, "{figures}");
+    assert!(figures["samples"].as_u64().unwrap() > 1_000_000, "{figures}");
+    // One picture of 1280x720 pixels of three floats at least.
+    let received = received.join().unwrap();
+    assert!(received.len() > 1280 * 720 * 12, "{} bytes", received.len());
+}

@@ -164,12 +164,12 @@ impl Film {
 pub struct ReadError;
 
 /// Copies a whole buffer to the host, waiting for the device.
-pub(crate) fn read_buffer<T: bytemuck::AnyBitPattern>(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<T>, ReadError> {
+pub(crate) fn read_buffer<T: bytemuck::Pod>(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<T>, ReadError> {
     read_ranges(gpu, &[(buffer, 0, buffer.size())])
 }
 
 /// Copies ranges (offset and length in bytes) of buffers to the host, one after the other, waiting for the device.
-pub(crate) fn read_ranges<T: bytemuck::AnyBitPattern>(
+pub(crate) fn read_ranges<T: bytemuck::Pod>(
     gpu: &Gpu,
     ranges: &[(&wgpu::Buffer, u64, u64)],
 ) -> Result<Vec<T>, ReadError> {
@@ -194,5 +194,8 @@ pub(crate) fn read_ranges<T: bytemuck::AnyBitPattern>(
     gpu.wait().map_err(|_| ReadError)?;
     receiver.recv().map_err(|_| ReadError)?.map_err(|_| ReadError)?;
     let mapped = staging.slice(..).get_mapped_range().map_err(|_| ReadError)?;
-    Ok(mapped.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect())
+    let mut values = vec![T::zeroed(); mapped.len() / size_of::<T>()];
+    let bytes = values.len() * size_of::<T>();
+    bytemuck::cast_slice_mut(&mut values).copy_from_slice(&mapped[..bytes]);
+    Ok(values)
 }

@@ -1,6 +1,12 @@
 //! The device: found by the tracer when headless, handed over by whoever has a window or headset otherwise.
 
-use std::sync::Arc;
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
+    time::Duration,
+};
 
 use thiserror::Error;
 
@@ -67,7 +73,13 @@ pub struct Gpu {
     /// The queue.
     pub queue: wgpu::Queue,
     info: Arc<wgpu::AdapterInfo>,
+    lost: Arc<AtomicBool>,
 }
+
+/// The device stopped answering: its driver was reset, or it was destroyed. Another one must be made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error("the graphics device was lost")]
+pub struct DeviceLost;
 
 /// Storage buffers that the largest kernel binds in one stage.
 const STORAGE_BUFFERS: u32 = 9;
@@ -102,7 +114,9 @@ impl Gpu {
         let info = adapter.get_info();
         let shortfalls = shortfalls(&device.limits());
         if shortfalls.is_empty() {
-            Ok(Self { adapter, device, queue, info: Arc::new(info) })
+            let lost = Arc::new(AtomicBool::new(false));
+            watch(&device, &lost);
+            Ok(Self { adapter, device, queue, info: Arc::new(info), lost })
         } else {
             Err(GpuError::Unfit { adapter: info.name, shortfalls: shortfalls.join("; ") })
         }
@@ -170,8 +184,36 @@ impl Gpu {
     ///
     /// # Errors
     /// When the device is lost.
-    pub fn wait(&self) -> Result<(), wgpu::PollError> {
-        self.device.poll(wgpu::PollType::wait_indefinitely()).map(|_| ())
+    pub fn wait(&self) -> Result<(), DeviceLost> {
+        let polled = self.device.poll(wgpu::PollType::wait_indefinitely());
+        if polled.is_err() || self.is_lost() { Err(DeviceLost) } else { Ok(()) }
+    }
+
+    /// Whether the device was lost. Everything on it is gone; what is asked of it does nothing or is an error.
+    pub fn is_lost(&self) -> bool {
+        self.lost.load(Ordering::Acquire)
+    }
+
+    /// Destroys the device, as a driver that is reset would: how recovery is tested.
+    pub fn lose(&self) {
+        self.lost.store(true, Ordering::Release);
+        self.device.destroy();
+    }
+
+    /// A buffer with contents, of which there must be some. On a lost device it is a dead one.
+    pub(crate) fn buffer(&self, label: &str, contents: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size: (contents.len() as u64).next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT),
+            usage,
+            mapped_at_creation: true,
+        });
+        // wgpu's own way to do this panics when the device is lost.
+        if let Ok(mut mapped) = buffer.get_mapped_range_mut(..) {
+            mapped.slice(..contents.len()).copy_from_slice(contents);
+        }
+        buffer.unmap();
+        buffer
     }
 
     /// Bytes that one storage binding may have.
@@ -179,6 +221,21 @@ impl Gpu {
         let limits = self.device.limits();
         limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
     }
+}
+
+/// Notes when the device is lost. What wgpu complains of afterwards is a consequence; before, it is a fault of ours.
+fn watch(device: &wgpu::Device, lost: &Arc<AtomicBool>) {
+    /// Another thread may hear of the loss first.
+    const GRACE: Duration = Duration::from_millis(100);
+    let noted = Arc::clone(lost);
+    device.set_device_lost_callback(move |_, _| noted.store(true, Ordering::Release));
+    let known = Arc::clone(lost);
+    device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
+        if !known.load(Ordering::Acquire) {
+            std::thread::sleep(GRACE);
+            assert!(known.load(Ordering::Acquire), "wgpu: {error}");
+        }
+    }));
 }
 
 fn usable_adapters() -> Vec<wgpu::Adapter> {

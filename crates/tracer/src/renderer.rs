@@ -486,21 +486,6 @@ impl Renderer {
         }
     }
 
-    /// What is in the film, counted; waiting for the device.
-    ///
-    /// # Errors
-    /// When the device is lost.
-    pub fn statistics(&self) -> Result<RenderStatistics, RenderError> {
-        let c = self.film.read_counters(&self.gpu)?;
-        Ok(RenderStatistics {
-            samples: self.samples,
-            segments: u64::from(c.segments_low) | u64::from(c.segments_high) << 32,
-            shadow_rays: u64::from(c.shadow_rays_low) | u64::from(c.shadow_rays_high) << 32,
-            non_finite: c.non_finite,
-            clamped: c.clamped,
-        })
-    }
-
     /// Reconstructs the view from the film and presents it to a target of the view's size.
     ///
     /// # Errors

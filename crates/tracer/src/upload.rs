@@ -123,8 +123,7 @@ impl Uploader<'_> {
         self.check(what, bytes)?;
         self.count_new(bytes);
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
-        let descriptor = wgpu::util::BufferInitDescriptor { label: Some(what), contents, usage };
-        Ok(self.gpu.device.create_buffer_init(&descriptor))
+        Ok(self.gpu.buffer(what, contents, usage))
     }
 
     /// The `head` bytes at the start of a buffer, with more after them.

@@ -7,7 +7,7 @@ use wgpu::BufferUsages;
 
 use crate::{
     distribution::View,
-    film::{Film, FilmOptions},
+    film::{Film, FilmOptions, ReadError, read_ranges},
     gpu::Gpu,
     kernels::{
         Kernel, KernelKey, TILE_SIZE,
@@ -113,6 +113,13 @@ impl ViewRenderer {
         self.stale = Some((copy, view, self.size));
     }
 
+    /// The view that was presented last, row by row: radiance, and the weight that it was found with.
+    pub fn finished(&self, gpu: &Gpu) -> Result<([u32; 2], Vec<[f32; 4]>), ReadError> {
+        let Some(pyramid) = &self.pyramid else { return Ok(([0; 2], Vec::new())) };
+        let bytes = u64::from(self.size[0]) * u64::from(self.size[1]) * 16;
+        Ok((self.size, read_ranges(gpu, &[(pyramid, 0, bytes)])?))
+    }
+
     fn resize(&mut self, size: [u32; 2]) {
         if self.size == size && self.pyramid.is_some() {
             return;
@@ -164,14 +171,8 @@ impl ViewRenderer {
         let pyramid = self.pyramid.as_ref().expect("made by resize");
         let stale = self.stale.as_ref().map_or(pyramid, |(buffer, ..)| buffer);
         let base = self.params(&film.options, world_from_film, quanta_to_radiance, settings);
-        let upload = |params: ViewParams| {
-            use wgpu::util::DeviceExt;
-            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("view parameters"),
-                contents: bytemuck::bytes_of(&params),
-                usage: BufferUsages::UNIFORM,
-            })
-        };
+        let upload =
+            |params: ViewParams| gpu.buffer("view parameters", bytemuck::bytes_of(&params), BufferUsages::UNIFORM);
         let tiles = |size: [u32; 2]| [size[0].div_ceil(TILE_SIZE), size[1].div_ceil(TILE_SIZE)];
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {

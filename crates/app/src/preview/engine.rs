@@ -11,11 +11,13 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use glam::UVec2;
+use tracer::film::FilmSnapshot;
 use tracer::gpu::Gpu;
 use tracer::scene::Scene;
 
 use super::controls::{Controls, Readout};
 use super::gaze::{Gaze, ScreenMapping};
+use super::keeper::Keeper;
 use super::navigation::Standpoint;
 use super::pacing::Pacing;
 use super::tracing::Tracing;
@@ -24,6 +26,7 @@ use crate::cli::choices::Mode;
 use crate::gaze::hub::{GazeHub, SampleTimes};
 use crate::output::exr;
 use crate::session::one_line;
+use crate::tev::TevLink;
 
 /// How long a thread with nothing to trace sleeps between looks at what the window wants.
 const IDLE: Duration = Duration::from_millis(50);
@@ -62,6 +65,8 @@ pub enum Request {
     SavePng(PathBuf),
     /// Save the whole film.
     SaveExr(PathBuf),
+    /// Go on with a film of the newest version of the scene.
+    GoOn(Arc<FilmSnapshot>),
 }
 
 /// The picture on the device.
@@ -108,6 +113,10 @@ pub struct State {
     pub film: String,
     /// The mode of the last batch.
     pub mode: Option<Mode>,
+    /// Samples of the film that were taken over from a file or a lost device.
+    pub taken_over: u64,
+    /// The device is gone, and all that was on it; another engine can go on with [`Engine::survivors`].
+    pub lost: bool,
     /// The thread has stopped for good, by a panic; standard error has the reason.
     pub dead: bool,
 }
@@ -118,11 +127,23 @@ struct Shared {
     /// The newest version of the scene, until the thread takes it.
     version: Mutex<Option<Arc<Scene>>>,
     state: Mutex<State>,
+    /// What another device needs when this one is lost.
+    survivors: Mutex<Survivors>,
+}
+
+/// What is on the host of a session.
+#[derive(Clone, Debug, Default)]
+pub struct Survivors {
+    /// The newest version of the scene.
+    pub scene: Option<Arc<Scene>>,
+    /// The film as it was when it was last kept.
+    pub film: Option<Arc<FilmSnapshot>>,
 }
 
 /// Handle of the thread; dropping it stops the thread.
 pub struct Engine {
     shared: Arc<Shared>,
+    gpu: Gpu,
     requests: Option<Sender<Request>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -139,7 +160,12 @@ impl Engine {
         repaint: impl Fn() + Send + 'static,
     ) -> std::io::Result<Self> {
         let shared = Arc::new(Shared::default());
+        let tev = args.tev.clone().map(|address| {
+            let tells = Arc::clone(&shared);
+            TevLink::start(address, "fovea", move |line| lock(&tells.state).message = Some(Message::now(line, false)))
+        });
         let (requests, inbox) = mpsc::channel();
+        let device = gpu.clone();
         let worker = Worker {
             shared: Arc::clone(&shared),
             inbox,
@@ -157,9 +183,11 @@ impl Engine {
             spp_at_gaze: 0.0,
             non_finite_dropped: 0,
             failed: None,
+            keeper: Keeper::new(Instant::now()),
+            tev: tev.transpose()?,
         };
         let thread = std::thread::Builder::new().name("engine".into()).spawn(move || worker.run())?;
-        Ok(Self { shared, requests: Some(requests), thread: Some(thread) })
+        Ok(Self { shared, gpu: device, requests: Some(requests), thread: Some(thread) })
     }
 
     /// Says what the window shows.
@@ -170,7 +198,13 @@ impl Engine {
     /// Shows a version of the scene from now on. The last word counts: versions that come while one is prepared are
     /// skipped.
     pub fn set_scene(&self, version: Arc<Scene>) {
+        lock(&self.shared.survivors).scene = Some(Arc::clone(&version));
         *lock(&self.shared.version) = Some(version);
+    }
+
+    /// What another engine can go on with.
+    pub fn survivors(&self) -> Survivors {
+        lock(&self.shared.survivors).clone()
     }
 
     /// Asks for something to be done; a thread that has stopped does nothing.
@@ -184,6 +218,7 @@ impl Engine {
     /// What the thread is up to.
     pub fn state(&self) -> State {
         let mut state = lock(&self.shared.state).clone();
+        state.lost = self.gpu.is_lost();
         state.dead |= self.thread.as_ref().is_none_or(JoinHandle::is_finished);
         state
     }
@@ -227,16 +262,24 @@ struct Worker {
     non_finite_dropped: u64,
     /// What could not be shown; not tried again until the window shows something else.
     failed: Option<Look>,
+    keeper: Keeper,
+    tev: Option<TevLink>,
 }
 
 impl Worker {
-    /// Until the window closes or the device is lost.
+    /// Until the window closes.
     fn run(mut self) {
         loop {
             match self.next_request() {
                 Ok(Some(request)) => self.carry_out(request),
                 Ok(None) => {}
                 Err(Closed) => return,
+            }
+            if self.tracing.is_lost() {
+                // The window finds out by the state, and nothing else can be done here.
+                (self.repaint)();
+                std::thread::sleep(IDLE);
+                continue;
             }
             self.take_version();
             let look = lock(&self.shared.look).clone();
@@ -245,7 +288,10 @@ impl Worker {
                 continue;
             }
             self.failed = None;
-            if let Err(error) = self.frame(&look) {
+            let done = self.frame(&look).and_then(|()| self.keep());
+            if let Err(error) = done
+                && !self.tracing.is_lost()
+            {
                 self.tell(one_line(&error), true);
                 self.failed = Some(look);
             }
@@ -278,6 +324,21 @@ impl Worker {
         }
         if self.is_due(look) {
             self.show(look)?;
+        }
+        Ok(())
+    }
+
+    /// Keeps the film on the host, and sends the picture to a viewer, when it is time for that.
+    fn keep(&mut self) -> anyhow::Result<()> {
+        let start = Instant::now();
+        let samples = self.tracing.samples();
+        let moving = self.moved_at.is_some_and(|at| at.elapsed() < SETTLED);
+        if !moving && self.keeper.is_due(start, samples) {
+            lock(&self.shared.survivors).film = self.tracing.snapshot()?.map(Arc::new);
+            self.keeper.taken(start, Instant::now(), samples);
+        }
+        if let Some(tev) = self.tev.as_mut().filter(|tev| self.shown.is_some() && tev.is_due()) {
+            tev.push(|| self.tracing.radiance())?;
         }
         Ok(())
     }
@@ -358,6 +419,7 @@ impl Worker {
         let result = match request {
             Request::Restart => {
                 self.tracing.restart();
+                self.forget_film();
                 self.pacing.restart();
                 self.rate = Rate::default();
                 Ok(None)
@@ -369,6 +431,18 @@ impl Worker {
             Request::SaveExr(path) => {
                 self.busy(Some(format!("saving {}", path.display())));
                 self.save_exr(path)
+            }
+            Request::GoOn(film) => {
+                self.take_version();
+                self.busy(Some("preparing the film".into()));
+                self.pacing.restart();
+                self.rate = Rate::default();
+                let result = self.tracing.go_on(&film);
+                if result.is_ok() {
+                    lock(&self.shared.state).taken_over = film.header.samples();
+                    lock(&self.shared.survivors).film = Some(film);
+                }
+                result.map(|()| None)
             }
         };
         self.busy(None);
@@ -398,6 +472,7 @@ impl Worker {
     fn take_version(&mut self) {
         let Some(version) = lock(&self.shared.version).take() else { return };
         self.busy(Some("preparing the scene".into()));
+        self.forget_film();
         let result = self.tracing.set_scene(version);
         self.busy(None);
         self.failed = None;
@@ -407,6 +482,13 @@ impl Worker {
             Ok(()) => self.shown = None,
             Err(error) => self.tell(one_line(&error), true),
         }
+    }
+
+    /// The film is about to start anew.
+    fn forget_film(&mut self) {
+        lock(&self.shared.survivors).film = None;
+        lock(&self.shared.state).taken_over = 0;
+        self.keeper = Keeper::new(Instant::now());
     }
 
     fn busy(&self, text: Option<String>) {

@@ -112,6 +112,7 @@ impl Screenshot {
         let tracing = readout.traced.saturating_sub(traced).as_secs_f64();
         json!({
             "samples": readout.samples,
+            "taken_over": state.taken_over,
             "samples_per_s": readout.samples_per_s,
             "spp_at_gaze": readout.spp_at_gaze,
             "elapsed_s": readout.elapsed.as_secs_f64(),

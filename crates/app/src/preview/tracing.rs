@@ -6,8 +6,9 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use fovea_sampler::Inverse;
-use glam::{UVec2, Vec3};
-use tracer::distribution::View as TracerView;
+use glam::{UVec2, Vec2, Vec3};
+use tracer::distribution::{Distribution, View as TracerView};
+use tracer::film::FilmSnapshot;
 use tracer::gpu::Gpu;
 use tracer::renderer::{FilmPose, Renderer, RendererOptions};
 use tracer::scene::Scene;
@@ -23,6 +24,7 @@ use crate::output::png;
 use crate::readback;
 use crate::sampling::{Acuity, Aim, GazePoint};
 use crate::settings::RunSettings;
+use crate::tev::TevPicture;
 use crate::view::View;
 
 /// The read-out at the gaze is a mean over so many pixels to each side.
@@ -50,6 +52,8 @@ pub struct Tracing {
     aim: Option<Aim>,
     view: Option<View>,
     traced: Duration,
+    /// The film was taken over: it stays as long as it covers the view, however coarse it is.
+    keeps_film: bool,
 }
 
 impl Tracing {
@@ -65,7 +69,13 @@ impl Tracing {
             aim: None,
             view: None,
             traced: Duration::ZERO,
+            keeps_film: false,
         }
+    }
+
+    /// Whether the device is gone, and all that was on it.
+    pub fn is_lost(&self) -> bool {
+        self.gpu.is_lost()
     }
 
     /// Whether there is a scene to trace.
@@ -86,6 +96,37 @@ impl Tracing {
         Ok(())
     }
 
+    /// Puts a film that was taken before in the place of the present one, and goes on with it; the present one stays if
+    /// that fails.
+    pub fn go_on(&mut self, film: &FilmSnapshot) -> anyhow::Result<()> {
+        let inverse = self.inverse(self.args.sampling.acuity())?;
+        let open = self.open.as_mut().context("no scene is open")?;
+        let everywhere = Distribution::omnidirectional(inverse);
+        let mut renderer = Renderer::new(&self.gpu, &film.header.renderer_options(), everywhere)?;
+        renderer.set_scene(&open.scene)?;
+        renderer.set_pose(film.header.pose);
+        renderer.restore(film)?;
+        let world_from_film = film.header.pose.world_from_film;
+        open.plan = Some(FilmPlan { options: film.header.options, world_from_film });
+        open.renderer = Some(renderer);
+        // The next look says where samples go, and whether another film would suit it better.
+        (self.aim, self.view, self.keeps_film) = (None, None, true);
+        self.traced = Duration::ZERO;
+        Ok(())
+    }
+
+    /// The film's sums; `None` while there is nothing in it.
+    pub fn snapshot(&self) -> anyhow::Result<Option<FilmSnapshot>> {
+        let renderer = self.open.as_ref().and_then(|open| open.renderer.as_ref());
+        Ok(renderer.filter(|renderer| renderer.samples() > 0).map(Renderer::snapshot).transpose()?)
+    }
+
+    /// The linear radiance of the picture that is shown, for a viewer.
+    pub fn radiance(&mut self) -> anyhow::Result<TevPicture> {
+        let (size, texels) = self.renderer()?.presented_radiance()?;
+        Ok(TevPicture { size, rgb: texels.iter().flat_map(|[r, g, b, _]| [*r, *g, *b]).collect() })
+    }
+
     /// Film pixels across and down.
     pub fn film_size(&self) -> Option<[u32; 2]> {
         let plan = self.open.as_ref()?.plan?;
@@ -95,7 +136,11 @@ impl Tracing {
     /// Whether [`Tracing::follow`] will take long: it makes a film and puts the scene on the device.
     pub fn must_prepare(&self, look: &Look) -> bool {
         let plan = self.open.as_ref().and_then(|open| open.plan);
-        plan.is_none_or(|plan| !plan.suits(&look.standpoint.view, look.size_px.as_vec2()))
+        !self.is_good(plan, &look.standpoint.view, look.size_px.as_vec2())
+    }
+
+    fn is_good(&self, plan: Option<FilmPlan>, view: &View, size_px: Vec2) -> bool {
+        plan.is_some_and(|plan| plan.suits(view, size_px) || self.keeps_film && plan.covers(view))
     }
 
     /// Brings film, pose and distribution in line with what the window shows. True when the picture changes at once.
@@ -119,9 +164,10 @@ impl Tracing {
             sequence: self.args.sampling.sequence.into(),
             ..RendererOptions::default()
         };
-        let open = self.open.as_mut().context("no scene is open")?;
         let size = size_px.as_vec2();
-        if open.plan.is_none_or(|plan| !plan.suits(&view, size)) {
+        let is_good = self.is_good(self.open.as_ref().and_then(|open| open.plan), &view, size);
+        let open = self.open.as_mut().context("no scene is open")?;
+        if !is_good {
             let plan = FilmPlan::new(&view, size, memory);
             if open.plan != Some(plan) {
                 let distribution = aim.distribution(&plan.options, plan.world_from_film, &inverse);
@@ -138,6 +184,7 @@ impl Tracing {
                     }
                 }
                 open.plan = Some(plan);
+                self.keeps_film = false;
                 self.aim = Some(aim);
                 self.traced = Duration::ZERO;
             }
@@ -173,7 +220,7 @@ impl Tracing {
     pub fn trace(&mut self, samples: u32) -> anyhow::Result<(u32, Duration)> {
         let start = Instant::now();
         let traced = self.renderer()?.trace(samples)?;
-        self.gpu.wait().context("the graphics device was lost")?;
+        self.gpu.wait()?;
         let took = start.elapsed();
         self.traced += took;
         Ok((traced, took))
@@ -199,7 +246,7 @@ impl Tracing {
             readback::PICTURE_FORMAT,
         )?;
         self.gpu.queue.submit([encoder.finish()]);
-        self.gpu.wait().context("the graphics device was lost")?;
+        self.gpu.wait()?;
         Ok(picture)
     }
 

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use egui::{Color32, Context, Key, Modifiers, Rect, Sense, Ui};
-use glam::UVec2;
+use glam::{Quat, UVec2};
+use tracer::film::{FilmHeader, FilmMapping, FilmSnapshot};
 
 use super::controls::{Controls, MODES, Shown};
-use super::engine::{Engine, Look, Message, Request, State};
+use super::engine::{Engine, Look, Message, Request, State, Survivors};
 use super::gaze::{self, Gaze, ScreenMapping, fovea_ring};
 use super::gaze_control::GazeControl;
 use super::gaze_panel;
@@ -21,7 +22,7 @@ use crate::cli::choices::Mode;
 use crate::cli::values::CameraChoice;
 use crate::output::free_name;
 use crate::reload::{LoadEvent, Loader};
-use crate::session::{Loaded, Source};
+use crate::session::{Loaded, Source, Viewpoint};
 
 /// How long a note stays.
 const NOTE: Duration = Duration::from_secs(5);
@@ -50,6 +51,8 @@ pub struct Window {
     camera: usize,
     texture: Option<(egui::TextureId, u64)>,
     screenshot: Option<Screenshot>,
+    /// A film to go on with once its scene is open.
+    resumed: Option<Arc<FilmSnapshot>>,
 }
 
 impl Window {
@@ -76,7 +79,32 @@ impl Window {
             camera: 0,
             texture: None,
             screenshot,
+            resumed: None,
         }
+    }
+
+    /// Goes on with a film as soon as its scene is open, from where it was taken.
+    pub fn resume(&mut self, film: FilmSnapshot) {
+        self.resumed = Some(Arc::new(film));
+    }
+
+    /// Whether the window's device is gone.
+    pub fn is_lost(&self) -> bool {
+        self.engine.state().lost
+    }
+
+    /// Goes on over another device, with the scene, the settings and what was last kept of the film.
+    pub fn renew(&mut self, engine: Engine, adapter: String) {
+        let Survivors { scene, film } = self.engine.survivors();
+        if let Some(scene) = scene {
+            engine.set_scene(scene);
+        }
+        if let Some(film) = film {
+            engine.request(Request::GoOn(film));
+        }
+        (self.engine, self.adapter, self.texture) = (engine, adapter, None);
+        self.note =
+            Some(Message::now("the graphics device was lost; the film goes on from its last snapshot".into(), false));
     }
 
     /// Takes what the loader has: a new scene starts from its camera, a new version of the same one keeps the view.
@@ -100,9 +128,14 @@ impl Window {
         let aspect = rect.width() / rect.height().max(1.0);
         (self.note, self.broken) = (None, None);
         if let Some(start) = open.viewpoints.get(open.start) {
-            let navigation = Navigation::new(start.position, start.rotation, start.vfov, aspect, open.diagonal);
+            let mut navigation = Navigation::new(start.position, start.rotation, start.vfov, aspect, open.diagonal);
             self.camera = open.start;
             self.engine.set_scene(Arc::clone(&loaded.scene));
+            if let Some(film) = self.resumed.take() {
+                let (rotation, vfov) = looking_at(&film.header, start, aspect);
+                navigation.jump(film.header.pose.position, rotation, vfov);
+                self.engine.request(Request::GoOn(film));
+            }
             self.scene = Some((open, navigation));
         }
     }
@@ -301,6 +334,9 @@ impl eframe::App for Window {
     fn ui(&mut self, ui: &mut Ui, frame: &mut eframe::Frame) {
         let ctx = ui.ctx().clone();
         let state = self.engine.state();
+        if state.lost {
+            return ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+        }
         let rect = ui.max_rect();
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
         self.follow_loader(&ctx, rect);
@@ -345,6 +381,16 @@ impl eframe::App for Window {
 
     fn clear_color(&self, _visuals: &egui::Visuals) -> [f32; 4] {
         [0.04, 0.04, 0.045, 1.0]
+    }
+}
+
+/// Where to look on a film, with a vertical angle that stays on it: a panorama as from the camera, else along its axis.
+fn looking_at(film: &FilmHeader, camera: &Viewpoint, aspect: f32) -> (Quat, f32) {
+    match film.options.mapping {
+        FilmMapping::Equirect => (camera.rotation, camera.vfov),
+        FilmMapping::Perspective { half_extent: [x, y] } => {
+            (film.pose.world_from_film, 2.0 * y.min(x / aspect.max(1e-3)).atan())
+        }
     }
 }
 

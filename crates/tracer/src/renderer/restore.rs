@@ -85,6 +85,30 @@ impl Renderer {
         Ok(())
     }
 
+    /// What is in the film, counted; waiting for the device.
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn statistics(&self) -> Result<RenderStatistics, RenderError> {
+        let c = self.film.read_counters(&self.gpu)?;
+        Ok(RenderStatistics {
+            samples: self.samples,
+            segments: u64::from(c.segments_low) | u64::from(c.segments_high) << 32,
+            shadow_rays: u64::from(c.shadow_rays_low) | u64::from(c.shadow_rays_high) << 32,
+            non_finite: c.non_finite,
+            clamped: c.clamped,
+        })
+    }
+
+    /// The linear radiance of the view that was presented last, row by row, with its size in pixels; empty before. The
+    /// fourth value of a pixel is the weight, in samples, that it was found with. Waits for the device.
+    ///
+    /// # Errors
+    /// When the device is lost.
+    pub fn presented_radiance(&self) -> Result<([u32; 2], Vec<[f32; 4]>), RenderError> {
+        Ok(self.view.finished(&self.gpu)?)
+    }
+
     /// Which samples are in the film.
     fn ranges(&self) -> Vec<SampleRange> {
         let before: u64 = self.restored.iter().map(|range| range.count).sum();
