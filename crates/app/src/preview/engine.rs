@@ -65,7 +65,7 @@ pub enum Request {
     SavePng(PathBuf),
     /// Save the whole film.
     SaveExr(PathBuf),
-    /// Go on with a film of the newest version of the scene.
+    /// Go on with a film of the newest version of the scene, or of the first that comes.
     GoOn(Arc<FilmSnapshot>),
 }
 
@@ -184,6 +184,7 @@ impl Engine {
             non_finite_dropped: 0,
             failed: None,
             keeper: Keeper::new(Instant::now()),
+            awaits_scene: None,
             tev: tev.transpose()?,
         };
         let thread = std::thread::Builder::new().name("engine".into()).spawn(move || worker.run())?;
@@ -263,6 +264,8 @@ struct Worker {
     /// What could not be shown; not tried again until the window shows something else.
     failed: Option<Look>,
     keeper: Keeper,
+    /// A film to go on with as soon as there is a scene.
+    awaits_scene: Option<Arc<FilmSnapshot>>,
     tev: Option<TevLink>,
 }
 
@@ -434,15 +437,7 @@ impl Worker {
             }
             Request::GoOn(film) => {
                 self.take_version();
-                self.busy(Some("preparing the film".into()));
-                self.pacing.restart();
-                self.rate = Rate::default();
-                let result = self.tracing.go_on(&film);
-                if result.is_ok() {
-                    lock(&self.shared.state).taken_over = film.header.samples();
-                    lock(&self.shared.survivors).film = Some(film);
-                }
-                result.map(|()| None)
+                self.go_on(film).map(|()| None)
             }
         };
         self.busy(None);
@@ -478,10 +473,30 @@ impl Worker {
         self.failed = None;
         self.pacing.restart();
         self.rate = Rate::default();
-        match result {
-            Ok(()) => self.shown = None,
-            Err(error) => self.tell(one_line(&error), true),
+        let result = result.and_then(|()| {
+            self.shown = None;
+            self.awaits_scene.take().map_or(Ok(()), |film| self.go_on(film))
+        });
+        if let Err(error) = result {
+            self.tell(one_line(&error), true);
         }
+    }
+
+    /// Goes on with a film, or waits for its scene with that.
+    fn go_on(&mut self, film: Arc<FilmSnapshot>) -> anyhow::Result<()> {
+        if !self.tracing.is_open() {
+            self.awaits_scene = Some(film);
+            return Ok(());
+        }
+        self.busy(Some("preparing the film".into()));
+        self.pacing.restart();
+        self.rate = Rate::default();
+        let result = self.tracing.go_on(&film);
+        self.busy(None);
+        result?;
+        lock(&self.shared.state).taken_over = film.header.samples();
+        lock(&self.shared.survivors).film = Some(film);
+        Ok(())
     }
 
     /// The film is about to start anew.

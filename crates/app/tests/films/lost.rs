@@ -120,8 +120,10 @@ fn an_engine_says_that_its_device_is_lost_and_hands_over_what_it_kept() {
     let film = survivors.film.unwrap();
     let kept = film.header.samples();
     let engine = Engine::start(gpu(), &args, gaze, || {}).unwrap();
-    engine.set_scene(survivors.scene.unwrap());
+    // A film that comes first waits for its scene.
     engine.request(Request::GoOn(film));
+    std::thread::sleep(Duration::from_millis(200));
+    engine.set_scene(survivors.scene.unwrap());
     engine.look(look);
     let state = wait_for(&engine, "the picture", |state| state.picture.is_some());
     eprintln!("kept {kept} samples, {} in the first picture after it", state.readout.samples);
