@@ -130,8 +130,8 @@ pub struct RenderArgs {
     /// Where eccentricity is measured: in the scene, or at the eye before a screen that shows the view
     #[arg(long, value_enum, default_value_t = EccentricityAt::Scene, value_name = "PLACE")]
     pub eccentricity: EccentricityAt,
-    /// Go on with a film that fovea wrote: what it is of (--film, --seed, --max-bounces, place) comes from there, and
-    /// --samples and --spp count what it holds already
+    /// Go on with a film that fovea wrote: what it is of (--film, --seed, --max-bounces, place) comes from there; mode,
+    /// gaze and scene are the command line's, and --samples and --spp count what the film holds already
     #[arg(long, value_name = "FILM.exr")]
     pub resume: Option<PathBuf>,
     /// Index of the first sample: ranges of one seed that are rendered apart add up to one render (`fovea merge`)
@@ -160,7 +160,7 @@ pub struct RenderArgs {
     pub dump_kernels: Option<PathBuf>,
 }
 
-/// Options of `fovea render` that say what a film is of, by their field's name: a film that is resumed has them already.
+/// Options of `fovea render` that say what a film is of, by their field's name: a film that is resumed has them.
 pub const FILM_OPTIONS: [&str; 6] = ["film", "camera", "orient", "seed", "sequence", "max_bounces"];
 
 /// `fovea merge`.

@@ -27,6 +27,16 @@ fn the_command_line_is_consistent() {
 }
 
 #[test]
+fn what_is_stated_of_a_film_is_told_from_defaults() {
+    assert_eq!(render("-o a.exr --resume b.exr --gaze 1,2").stated, Vec::<&str>::new());
+    let stated = render("-o a.exr --resume b.exr --seed 1 --max-bounces 8 --film equirect:2048x1024").stated;
+    assert_eq!(stated, ["film", "seed", "max_bounces"]);
+    assert!(complaint("fovea render -o a.exr --resume b.exr --first-sample 5").contains("--first-sample"));
+    assert!(complaint("fovea render -o a.exr --tev localhost").contains("HOST:PORT"));
+    assert!(complaint("fovea merge -o a.exr").contains("FILM.exr"));
+}
+
+#[test]
 fn defaults_are_those_of_the_documentation() {
     let args = render("-o a.exr");
     assert_eq!(args.sampling.mode, Mode::Fv);
