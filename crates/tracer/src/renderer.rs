@@ -8,12 +8,14 @@ use thiserror::Error;
 mod batch;
 mod generation;
 mod query;
+mod panorama;
 mod restore;
 mod split;
 mod timing;
 
 use batch::BoundKernels;
 pub use query::{Query, QueryAnswer, RayKind};
+pub use panorama::Refreshed;
 pub use restore::RestoreError;
 
 use crate::{
