@@ -5,9 +5,15 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 #![cfg(target_os = "linux")]
 
+#[path = "vr/failures.rs"]
+mod failures;
+#[path = "vr/gaze.rs"]
+mod gaze;
 #[path = "vr/inner.rs"]
 mod inner;
 #[path = "vr/monado.rs"]
 mod monado;
+#[path = "vr/preview.rs"]
+mod preview;
 #[path = "vr/session.rs"]
 mod session;

@@ -89,7 +89,8 @@ pub struct Panorama {
 }
 
 impl Panorama {
-    /// An empty, black panorama for a film; `None` when the film is none, or larger than the device's textures.
+    /// An empty, black panorama for a film; `None` when the film is none, or does not fit the device's
+    /// textures or memory.
     pub fn new(gpu: &Gpu, film: &FilmOptions) -> Option<Self> {
         let size = [film.width, film.height];
         let limit = gpu.device.limits().max_texture_dimension_2d;
@@ -98,6 +99,7 @@ impl Panorama {
         }
         // Down to a single row.
         let levels = film.height.ilog2() + 1;
+        let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let texture = |label| {
             gpu.device.create_texture(&wgpu::TextureDescriptor {
                 label: Some(label),
@@ -121,6 +123,9 @@ impl Panorama {
             (0..levels).map(level).collect()
         };
         let (known, filled) = (texture("panorama, known"), texture("panorama, filled"));
+        if pollster::block_on(scope.pop()).is_some() {
+            return None;
+        }
         let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("panorama"),
             address_mode_u: wgpu::AddressMode::Repeat,

@@ -7,15 +7,15 @@ use thiserror::Error;
 
 mod batch;
 mod generation;
-mod query;
 mod panorama;
+mod query;
 mod restore;
 mod split;
 mod timing;
 
 use batch::BoundKernels;
-pub use query::{Query, QueryAnswer, RayKind};
 pub use panorama::Refreshed;
+pub use query::{Query, QueryAnswer, RayKind};
 pub use restore::RestoreError;
 
 use crate::{

@@ -15,14 +15,14 @@ pub enum VrError {
     NoLoader,
     /// The loader knows of no runtime, or cannot open it.
     #[error(
-        "no OpenXR runtime is set up ({0}): start SteamVR, WiVRn or Monado and make it the system's OpenXR runtime"
+        "no OpenXR runtime is set up ({0:?}): start SteamVR, WiVRn or Monado and make it the system's OpenXR runtime"
     )]
     NoRuntime(Code),
     /// A runtime is set up, but it does not answer.
-    #[error("the OpenXR runtime does not answer ({0}): is it running?")]
+    #[error("the OpenXR runtime does not answer ({0:?}): is it running?")]
     RuntimeDown(Code),
     /// The runtime sees no headset.
-    #[error("{runtime} sees no headset ({code}): is it connected and switched on?")]
+    #[error("{runtime} sees no headset ({code:?}): is it connected and switched on?")]
     NoHeadset {
         /// Its name.
         runtime: String,
@@ -55,10 +55,10 @@ pub enum VrError {
     #[error("the headset takes none of the picture formats RGBA8 and BGRA8")]
     NoFormat,
     /// The runtime went away, or asked the program to let go.
-    #[error("the connection to the headset was lost ({0})")]
+    #[error("the OpenXR runtime was lost ({0:?}): it has ended, or was ended; the preview goes on in the window")]
     Lost(Code),
     /// A call failed that should not.
-    #[error("OpenXR's {call} failed: {code}")]
+    #[error("OpenXR's {call} failed: {code:?}")]
     Call {
         /// Its name.
         call: &'static str,

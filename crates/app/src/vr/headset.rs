@@ -6,7 +6,7 @@ use glam::Quat;
 use openxr as xr;
 use tracer::gpu::Gpu;
 
-use super::device::{self, HeadsetDevice};
+use super::device;
 use super::error::VrError;
 use super::eyes::{self, Eye, EyePicture, EyeView, orientation};
 use super::gaze::GazeSample;
@@ -26,7 +26,7 @@ pub struct Headset {
     stream: xr::FrameStream<xr::Vulkan>,
     waiter: xr::FrameWaiter,
     session: xr::Session<xr::Vulkan>,
-    device: HeadsetDevice,
+    gpu: Gpu,
     runtime: Runtime,
     format: wgpu::TextureFormat,
     blend_mode: xr::EnvironmentBlendMode,
@@ -74,11 +74,13 @@ impl Headset {
         let blend_modes = instance
             .enumerate_environment_blend_modes(system, STEREO)
             .map_err(VrError::call("xrEnumerateEnvironmentBlendModes"))?;
+        let is_opaque = |mode: &xr::EnvironmentBlendMode| *mode == xr::EnvironmentBlendMode::OPAQUE;
         let device = device::open(&runtime)?;
         let (session, waiter, stream) = device::session(&runtime, &device)?;
+        let gpu = device.gpu;
         let format = eyes::choose_format(&session)?;
         let eye = |index: usize| {
-            let limit = device.gpu.device.limits().max_texture_dimension_2d;
+            let limit = gpu.device.limits().max_texture_dimension_2d;
             let size = sizes.get(index).map_or([1; 2], |view| {
                 let side = |recommended: u32, most: u32| recommended.clamp(1, most.clamp(1, limit));
                 [
@@ -86,7 +88,7 @@ impl Headset {
                     side(view.recommended_image_rect_height, view.max_image_rect_height),
                 ]
             });
-            Eye::new(&device.gpu, &session, format, size)
+            Eye::new(&gpu, &session, format, size)
         };
         let eyes = [eye(0)?, eye(1)?];
         let space = |kind| {
@@ -101,9 +103,15 @@ impl Headset {
             stream,
             waiter,
             session,
-            device,
+            gpu,
             format: format.1,
-            blend_mode: blend_modes.first().copied().unwrap_or(xr::EnvironmentBlendMode::OPAQUE),
+            // A see-through headset may have no opaque mode.
+            blend_mode: blend_modes
+                .iter()
+                .copied()
+                .find(is_opaque)
+                .or(blend_modes.first().copied())
+                .unwrap_or(xr::EnvironmentBlendMode::OPAQUE),
             runtime,
             lifecycle: Lifecycle::default(),
             shown_at: None,
@@ -112,7 +120,7 @@ impl Headset {
 
     /// The headset's graphics device. Only the thread that drives this value may submit to it.
     pub fn gpu(&self) -> &Gpu {
-        &self.device.gpu
+        &self.gpu
     }
 
     /// Runtime and headset.
@@ -248,37 +256,43 @@ impl Headset {
         Ok(valid.then_some(location.pose.orientation).and_then(orientation))
     }
 
-    /// What was pressed, and the newest sample of the eyes. Only while [`Lifecycle::is_focused`].
+    /// What was pressed since the last call, and the newest sample of the eyes. Only while [`Lifecycle::is_focused`].
     ///
     /// # Errors
     /// When the runtime is gone.
     pub fn input(&mut self) -> Result<(Vec<Press>, Option<GazeSample>), VrError> {
-        let presses = self.input.sync(&self.session)?;
+        Ok((self.input.sync(&self.session)?, self.gaze()?))
+    }
+
+    /// The newest sample of the eyes; `None` without an eye tracker.
+    ///
+    /// # Errors
+    /// When the runtime is gone.
+    pub fn gaze(&self) -> Result<Option<GazeSample>, VrError> {
         if !self.facts().eye_gaze {
-            return Ok((presses, None));
+            return Ok(None);
         }
         let arrived = Instant::now();
         let clock = self.runtime.now();
-        let Some(time) = clock.or(self.shown_at) else { return Ok((presses, None)) };
+        let Some(time) = clock.or(self.shown_at) else { return Ok(None) };
         let reading = self.input.gaze(&self.runtime, &self.session, &self.local, time)?;
         let captured = reading.and_then(|reading| reading.sampled).zip(clock).and_then(|(sampled, now)| {
             let age = now.as_nanos().checked_sub(sampled.as_nanos())?;
             arrived.checked_sub(Duration::from_nanos(age.max(0) as u64))
         });
-        let sample = GazeSample {
+        Ok(Some(GazeSample {
             captured: captured.unwrap_or(arrived),
             arrived,
             time_known: captured.is_some(),
             local_from_gaze: reading.map(|reading| reading.local_from_gaze),
-        };
-        Ok((presses, Some(sample)))
+        }))
     }
 }
 
 impl Drop for Headset {
     fn drop(&mut self) {
         // What still draws into the runtime's images must be done before they go. A lost device draws nothing.
-        let _ = self.device.gpu.wait();
+        let _ = self.gpu.wait();
     }
 }
 

@@ -1,7 +1,10 @@
 //! A session from its beginning to its end.
 
+use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::Command;
+use std::process::{Child, Command, Stdio};
+
+use image::RgbImage;
 
 use crate::monado::{Monado, said};
 
@@ -45,4 +48,96 @@ fn a_session_shows_three_hundred_frames() {
     assert!(wrong.is_empty(), "{wrong:#?}");
     let figures = text.lines().find(|line| line.contains("frames drawn")).unwrap_or_default();
     eprintln!("{figures}, no validation message");
+}
+
+#[test]
+fn each_eye_sees_what_a_headless_render_of_its_pose_shows() {
+    let name = "each_eye_sees_what_a_headless_render_of_its_pose_shows";
+    let Some(mut monado) = Monado::find(name) else { return };
+    monado.start(None);
+    let text = said(&monado.inner(name).output().unwrap());
+    text.lines().filter(|line| line.contains("mean difference")).for_each(|line| eprintln!("{line}"));
+}
+
+/// An X server without a screen, whose picture is a file; stopped when dropped.
+struct Display(Child);
+
+impl Drop for Display {
+    fn drop(&mut self) {
+        // It may have ended by itself; either way it must not outlive the test.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+impl Display {
+    /// With its name; `None` when Xvfb is not installed.
+    fn start(folder: &Path) -> Option<(Self, String)> {
+        let mut server = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-screen", "0", "1280x720x24", "-nolisten", "tcp", "-noreset", "-fbdir"])
+            .arg(folder)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .ok()?;
+        let mut number = String::new();
+        BufReader::new(server.stdout.take().unwrap()).read_line(&mut number).unwrap();
+        Some((Self(server), format!(":{}", number.trim())))
+    }
+}
+
+/// The picture of an X window dump with 32 bits a pixel.
+fn dumped(file: &[u8]) -> RgbImage {
+    let word = |index: usize| u32::from_be_bytes(file[4 * index..][..4].try_into().unwrap()) as usize;
+    let (header, width, height, bits, stride, colours) = (word(0), word(4), word(5), word(11), word(12), word(19));
+    assert_eq!(bits, 32, "bits a pixel");
+    let pixels = &file[header + 12 * colours..];
+    RgbImage::from_fn(width as u32, height as u32, |x, y| {
+        let at = y as usize * stride + 4 * x as usize;
+        // Xvfb's is little-endian: blue first.
+        image::Rgb([pixels[at + 2], pixels[at + 1], pixels[at]])
+    })
+}
+
+/// Mean brightness and its standard deviation over a part of a picture.
+fn brightness(picture: &RgbImage, columns: std::ops::Range<u32>) -> (f64, f64) {
+    let values: Vec<f64> = columns
+        .flat_map(|x| (0..picture.height()).map(move |y| (x, y)))
+        .map(|(x, y)| picture.get_pixel(x, y).0.iter().map(|value| f64::from(*value)).sum::<f64>() / 3.0)
+        .collect();
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64;
+    (mean, variance.sqrt())
+}
+
+#[test]
+fn both_eyes_pictures_are_on_the_headsets_display() {
+    let name = "both_eyes_pictures_are_on_the_headsets_display";
+    let Some(mut monado) = Monado::find(name) else { return };
+    let Some((_display, display)) = Display::start(monado.place()) else {
+        eprintln!("SKIP {name}: Xvfb or xdotool is missing");
+        return;
+    };
+    monado.start(Some(&display));
+    let mut session = monado.inner(name).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut picture = None;
+    let mut said = Vec::new();
+    for line in BufReader::new(session.stderr.take().unwrap()).lines() {
+        let line = line.unwrap();
+        if line.contains("SHOOT") {
+            picture = Some(dumped(&std::fs::read(monado.place().join("Xvfb_screen0")).unwrap()));
+        }
+        said.push(line);
+    }
+    assert!(session.wait().unwrap().success(), "{}", said.join("\n"));
+    let picture = picture.unwrap();
+    if let Some(path) = std::env::var_os("FOVEA_VR_SCREENSHOT") {
+        picture.save(path).unwrap();
+    }
+    let middle = picture.width() / 2;
+    let (left, right) = (brightness(&picture, 0..middle), brightness(&picture, middle..picture.width()));
+    eprintln!("left eye: brightness {left:.1?} (mean, deviation), right eye: {right:.1?}");
+    // One panorama from one point: the same scene in both, through lenses that are mirror images of each other.
+    assert!(left.0 > 20.0 && left.1 > 10.0 && right.0 > 20.0 && right.1 > 10.0, "{left:?} {right:?}");
+    assert!((left.0 - right.0).abs() < 0.1 * left.0, "{left:?} {right:?}");
 }
