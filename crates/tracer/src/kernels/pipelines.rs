@@ -30,7 +30,7 @@ pub enum KernelError {
     },
 }
 
-/// A compiled kernel: compute, or a render pipeline where [`Kernel::draws`].
+/// A compiled kernel: compute, or a render pipeline where [`Kernel::draws`](super::Kernel::draws).
 #[derive(Debug)]
 pub struct Pipeline {
     kind: PipelineKind,
