@@ -79,6 +79,9 @@ pub struct PreviewArgs {
     /// The window's size when it opens, pixels
     #[arg(long, default_value = "1280x720", value_name = "WxH")]
     pub window: SizePx,
+    /// Begin in the headset, by OpenXR; the window shows a mirror
+    #[arg(long)]
+    pub vr: bool,
     /// Memory that the film may take, MiB; more gives a finer panorama
     #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(16..=65536), value_name = "MIB")]
     pub film_memory: u32,

@@ -26,13 +26,19 @@ impl FilmPlan {
     ///
     /// The panorama's width is the next power of two above 360 times the view's pixels per degree, or what fits.
     pub fn new(view: &View, size_px: Vec2, memory_bytes: u64) -> Self {
+        let panorama = Self::panorama(view, size_px, memory_bytes, u32::MAX);
+        if panorama.coarseness(view, size_px) <= TOLERABLE_COARSENESS { panorama } else { Self::lens(view, size_px) }
+    }
+
+    /// The panorama for a view of `size_px` pixels, at most `widest` pixels wide and of at most `memory_bytes`.
+    pub fn panorama(view: &View, size_px: Vec2, memory_bytes: u64, widest: u32) -> Self {
         let wanted = (pixels_per_radian(view, size_px) * std::f32::consts::TAU).clamp(1.0, 65_536.0) as u32;
         let mut width = wanted.next_power_of_two().max(SMALLEST_PANORAMA);
-        while FilmOptions::equirect(width, width / 2).bytes() > memory_bytes && width > SMALLEST_PANORAMA {
+        let too_large = |width| width > widest || FilmOptions::equirect(width, width / 2).bytes() > memory_bytes;
+        while too_large(width) && width > SMALLEST_PANORAMA {
             width /= 2;
         }
-        let panorama = Self { options: FilmOptions::equirect(width, width / 2), world_from_film: Quat::IDENTITY };
-        if panorama.coarseness(view, size_px) <= TOLERABLE_COARSENESS { panorama } else { Self::lens(view, size_px) }
+        Self { options: FilmOptions::equirect(width, width / 2), world_from_film: Quat::IDENTITY }
     }
 
     /// Whether a view can be shown from this film without another being clearly better.

@@ -20,6 +20,8 @@ pub mod session;
 pub mod settings;
 pub mod tev;
 pub mod view;
+#[cfg(any(target_os = "linux", target_os = "windows"))]
+pub mod vr;
 
 /// The README's example compiles.
 #[cfg(doctest)]

@@ -17,7 +17,7 @@ use crate::output::exr;
 use crate::reload::Loader;
 use crate::reload::rule::Timing;
 use crate::session::{self, Source};
-use engine::Engine;
+use engine::{Engine, Request};
 use gaze_control::GazeControl;
 use screenshot::{Outcome, Screenshot};
 use window::Window;
@@ -56,9 +56,12 @@ pub fn run(args: &PreviewArgs) -> anyhow::Result<()> {
         .map(|(after, path)| Screenshot::new(after, path, Arc::clone(&outcome)));
     let repaint = Repaint::default();
     let repaints = repaint.clone();
-    let first = |engine, adapter| -> anyhow::Result<Window> {
+    let first = |engine: Engine, adapter| -> anyhow::Result<Window> {
         let loader = Loader::start(args.scene.clone(), Timing::default(), move || repaints.request())?;
         loader.open(source.clone());
+        if args.vr {
+            engine.request(Request::EnterHeadset);
+        }
         let gaze = GazeControl::new(Arc::clone(&gaze), args);
         let mut window = Window::new(engine, loader, adapter, args, gaze, screenshot);
         if let Some(file) = resumed {

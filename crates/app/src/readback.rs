@@ -24,6 +24,30 @@ pub fn picture_texture(gpu: &Gpu, size: [u32; 2]) -> wgpu::Texture {
     })
 }
 
+/// A texture that egui shows, [`write_texture`] fills and [`read_texture`] reads.
+pub fn upload_texture(gpu: &Gpu, size: [u32; 2]) -> wgpu::Texture {
+    gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("mirror"),
+        size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format: PICTURE_FORMAT,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    })
+}
+
+/// Fills such a texture; `texels` must be as many as it has.
+pub fn write_texture(gpu: &Gpu, texture: &wgpu::Texture, texels: &[[u8; 4]]) {
+    gpu.queue.write_texture(
+        texture.as_image_copy(),
+        texels.as_flattened(),
+        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(texture.width() * 4), rows_per_image: None },
+        texture.size(),
+    );
+}
+
 /// Finds out whether the adapter can hold a picture of this size.
 ///
 /// # Errors

@@ -76,6 +76,11 @@ const MODULES: &[(&str, &str)] = &[
     ("view::push", include_str!("../../../shaders/view/push.wesl")),
     ("view::tonemap", include_str!("../../../shaders/view/tonemap.wesl")),
     ("view::present", include_str!("../../../shaders/view/present.wesl")),
+    ("vr::bindings", include_str!("../../../shaders/vr/bindings.wesl")),
+    ("vr::resolve", include_str!("../../../shaders/vr/resolve.wesl")),
+    ("vr::pull", include_str!("../../../shaders/vr/pull.wesl")),
+    ("vr::push", include_str!("../../../shaders/vr/push.wesl")),
+    ("vr::eye", include_str!("../../../shaders/vr/eye.wesl")),
 ];
 
 /// The kernels, each the entry module of its name.
@@ -97,11 +102,19 @@ pub enum Kernel {
     Push,
     /// Tone mapping to the target.
     Present,
+    /// Film to the finest level of the panorama.
+    PanoramaResolve,
+    /// One level of the panorama from the finer one.
+    PanoramaPull,
+    /// One level of the panorama filled from the coarser one.
+    PanoramaPush,
+    /// What an eye sees of the panorama.
+    Eye,
 }
 
 impl Kernel {
     /// Every kernel.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 12] = [
         Self::Trace,
         Self::Generate,
         Self::Query,
@@ -110,6 +123,10 @@ impl Kernel {
         Self::Pull,
         Self::Push,
         Self::Present,
+        Self::PanoramaResolve,
+        Self::PanoramaPull,
+        Self::PanoramaPush,
+        Self::Eye,
     ];
 
     /// Module below `shaders/`, which is also the label of pipeline, timer and dump.
@@ -123,10 +140,19 @@ impl Kernel {
             Self::Pull => "view::pull",
             Self::Push => "view::push",
             Self::Present => "view::present",
+            Self::PanoramaResolve => "vr::resolve",
+            Self::PanoramaPull => "vr::pull",
+            Self::PanoramaPush => "vr::push",
+            Self::Eye => "vr::eye",
         }
     }
 
-    /// Name of the entry point (the fragment entry for [`Kernel::Present`]).
+    /// Whether this is a render pipeline, which draws to a target; the others compute.
+    pub const fn draws(self) -> bool {
+        matches!(self, Self::Present | Self::PanoramaResolve | Self::PanoramaPull | Self::PanoramaPush | Self::Eye)
+    }
+
+    /// Name of the entry point (the fragment entry where the kernel draws).
     pub const fn entry_point(self) -> &'static str {
         match self {
             Self::Trace => "trace",
@@ -137,6 +163,10 @@ impl Kernel {
             Self::Pull => "pull",
             Self::Push => "push",
             Self::Present => "present",
+            Self::PanoramaResolve => "resolve",
+            Self::PanoramaPull => "pull",
+            Self::PanoramaPush => "push",
+            Self::Eye => "eye_picture",
         }
     }
 }

@@ -17,6 +17,7 @@ pub mod film;
 pub mod gpu;
 pub mod import;
 pub mod kernels;
+pub mod panorama;
 pub mod provenance;
 pub mod renderer;
 pub mod scene;

@@ -7,12 +7,14 @@ use thiserror::Error;
 
 mod batch;
 mod generation;
+mod panorama;
 mod query;
 mod restore;
 mod split;
 mod timing;
 
 use batch::BoundKernels;
+pub use panorama::Refreshed;
 pub use query::{Query, QueryAnswer, RayKind};
 pub use restore::RestoreError;
 

@@ -69,7 +69,7 @@ pub struct ViewSettings {
 }
 
 /// Samples at which a pixel's own mean weighs as much as its neighbourhood's.
-const CONFIDENCE_SAMPLES: f32 = 1.0;
+pub(crate) const CONFIDENCE_SAMPLES: f32 = 1.0;
 
 /// Stops of sample density from the darkest colour of its debug view, 1/16 a pixel, to white, 4096.
 const DENSITY_STOPS: f32 = 16.0;
@@ -167,7 +167,7 @@ impl ViewRenderer {
         let gather = compute(pipelines, Kernel::Gather)?;
         let pull = compute(pipelines, Kernel::Pull)?;
         let push = compute(pipelines, Kernel::Push)?;
-        let present = pipelines.present(device, &key(Kernel::Present).expect("every kernel has a key"), format)?;
+        let present = pipelines.drawn(device, &key(Kernel::Present).expect("every kernel has a key"), format)?;
         let pyramid = self.pyramid.as_ref().expect("made by resize");
         let stale = self.stale.as_ref().map_or(pyramid, |(buffer, ..)| buffer);
         let base = self.params(&film.options, world_from_film, quanta_to_radiance, settings);

@@ -1,4 +1,4 @@
-//! `fovea adapters`: what wgpu finds, and which one would be used.
+//! `fovea adapters`: what wgpu finds, which one would be used, and the headset's runtime.
 
 use serde_json::{Value, json};
 use tracer::gpu::{AdapterDescription, Gpu};
@@ -13,12 +13,45 @@ use crate::cli::AdaptersArgs;
 pub fn run(args: &AdaptersArgs) -> anyhow::Result<()> {
     let adapters = Gpu::adapters();
     if args.json {
-        return print_json(&json!({ "adapters": adapters.iter().map(describe).collect::<Vec<_>>() }));
+        let adapters: Vec<Value> = adapters.iter().map(describe).collect();
+        let openxr = match headset() {
+            Ok(Headset { runtime, system, eye_gaze }) => {
+                json!({ "runtime": runtime, "system": system, "eye_gaze": eye_gaze })
+            }
+            Err(error) => json!({ "error": error }),
+        };
+        return print_json(&json!({ "adapters": adapters, "openxr": openxr }));
     }
+    let mut text: String = adapters.iter().map(line).collect();
     if adapters.is_empty() {
-        return print_text("no graphics adapter found\n");
+        text.push_str("no graphics adapter found\n");
     }
-    print_text(&adapters.iter().map(line).collect::<String>())
+    text.push_str(&match headset() {
+        Ok(Headset { runtime, system, eye_gaze }) => {
+            format!("OpenXR: {runtime}, {system}, {} eye gaze\n", if eye_gaze { "with" } else { "without" })
+        }
+        Err(error) => format!("OpenXR: {error}\n"),
+    });
+    print_text(&text)
+}
+
+/// A headset that VR would use.
+struct Headset {
+    runtime: String,
+    system: String,
+    eye_gaze: bool,
+}
+
+#[cfg(any(target_os = "linux", target_os = "windows"))]
+fn headset() -> Result<Headset, String> {
+    let runtime = crate::vr::runtime::Runtime::find().map_err(|error| error.to_string())?;
+    let crate::vr::runtime::Facts { runtime, system, eye_gaze } = runtime.facts().clone();
+    Ok(Headset { runtime, system, eye_gaze })
+}
+
+#[cfg(not(any(target_os = "linux", target_os = "windows")))]
+fn headset() -> Result<Headset, String> {
+    Err("headsets are supported on Linux and Windows only".into())
 }
 
 fn describe(adapter: &AdapterDescription) -> Value {

@@ -3,14 +3,14 @@
 //! The window says what it wants to see ([`Engine::look`], the last word counts) and asks for things to be done
 //! ([`Engine::request`], in order). The thread answers with a [`State`] and asks the window to repaint.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, TryRecvError};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
-use glam::UVec2;
+use glam::{UVec2, Vec2};
 use tracer::film::FilmSnapshot;
 use tracer::gpu::Gpu;
 use tracer::scene::Scene;
@@ -24,9 +24,16 @@ use super::tracing::Tracing;
 use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
 use crate::gaze::hub::{GazeHub, SampleTimes};
-use crate::output::exr;
+use crate::output::{exr, png};
+use crate::readback;
 use crate::session::one_line;
 use crate::tev::TevLink;
+
+#[cfg(any(target_os = "linux", target_os = "windows"))]
+mod headset;
+#[cfg(not(any(target_os = "linux", target_os = "windows")))]
+#[path = "engine/no_headset.rs"]
+mod headset;
 
 /// How long a thread with nothing to trace sleeps between looks at what the window wants.
 const IDLE: Duration = Duration::from_millis(50);
@@ -54,6 +61,8 @@ pub struct Look {
     pub mapping: ScreenMapping,
     /// Physical pixels of the picture.
     pub size_px: UVec2,
+    /// The pointer while it is over the picture, as a point of the view.
+    pub pointer: Option<Vec2>,
 }
 
 /// Something to be done once.
@@ -67,6 +76,12 @@ pub enum Request {
     SaveExr(PathBuf),
     /// Go on with a film of the newest version of the scene, or of the first that comes.
     GoOn(Arc<FilmSnapshot>),
+    /// Show the scene in the headset; the window shows a mirror.
+    EnterHeadset,
+    /// Show it in the window alone.
+    LeaveHeadset,
+    /// Turn the marker of the fovea in the headset on or off.
+    ToggleMarker,
 }
 
 /// The picture on the device.
@@ -96,6 +111,31 @@ impl Message {
     }
 }
 
+/// A headset in use.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct HeadsetReadout {
+    /// Name and version of the OpenXR runtime.
+    pub runtime: String,
+    /// Name of the headset.
+    pub system: String,
+    /// Whether the runtime says where the eyes look.
+    pub has_eye_tracker: bool,
+    /// What the session is up to.
+    pub words: String,
+    /// What the fovea goes by.
+    pub gaze_from: String,
+    /// Age of the eyes' sample, where it is known.
+    pub gaze_age: Option<Duration>,
+    /// Frames handed to the runtime.
+    pub frames: u64,
+    /// Frames of the headset that went by without a new picture.
+    pub missed: u64,
+    /// How often the panorama that the eyes see was brought up to date.
+    pub refreshes: u64,
+    /// Width of the mirror over its height.
+    pub mirror_aspect: f32,
+}
+
 /// What the thread is up to.
 #[derive(Clone, Debug, Default)]
 pub struct State {
@@ -117,6 +157,10 @@ pub struct State {
     pub taken_over: u64,
     /// The device is gone, and all that was on it; another engine can go on with [`Engine::survivors`].
     pub lost: bool,
+    /// The headset while it is in use.
+    pub headset: Option<HeadsetReadout>,
+    /// How often the next mode was asked for in the headset.
+    pub mode_presses: u64,
     /// The thread has stopped for good, by a panic; standard error has the reason.
     pub dead: bool,
 }
@@ -170,6 +214,10 @@ impl Engine {
             shared: Arc::clone(&shared),
             inbox,
             pacing: Pacing::new(gpu.is_software()),
+            gpu: gpu.clone(),
+            headset: None,
+            untold: None,
+            mirror: None,
             tracing: Tracing::new(gpu, args.clone()),
             gaze,
             sample: None,
@@ -243,6 +291,13 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 struct Worker {
     shared: Arc<Shared>,
     inbox: Receiver<Request>,
+    /// The window's device.
+    gpu: Gpu,
+    headset: Option<headset::HeadsetRun>,
+    /// What went wrong before there was a picture.
+    untold: Option<String>,
+    /// The headset's mirror on the window's device.
+    mirror: Option<(wgpu::Texture, Picture)>,
     tracing: Tracing,
     gaze: Arc<GazeHub>,
     /// The gaze sample that the last batch went by.
@@ -278,7 +333,7 @@ impl Worker {
                 Ok(None) => {}
                 Err(Closed) => return,
             }
-            if self.tracing.is_lost() {
+            if self.headset.is_none() && self.tracing.is_lost() {
                 // The window finds out by the state, and nothing else can be done here.
                 (self.repaint)();
                 std::thread::sleep(IDLE);
@@ -291,6 +346,12 @@ impl Worker {
                 continue;
             }
             self.failed = None;
+            if self.headset.is_some() {
+                if let Err(error) = self.headset_frame(&look) {
+                    self.tell(one_line(&error), true);
+                }
+                continue;
+            }
             let done = self.frame(&look).and_then(|()| self.keep());
             if let Err(error) = done
                 && !self.tracing.is_lost()
@@ -379,29 +440,41 @@ impl Worker {
             self.non_finite_dropped = self.tracing.non_finite_dropped()?;
             self.read_at = Some(Instant::now());
         }
-        let readout = Readout {
-            samples,
-            samples_per_s: self.rate.per_second(),
-            spp_at_gaze: self.spp_at_gaze,
-            elapsed: self.tracing.elapsed(),
-            traced: self.traced,
-            non_finite_dropped: self.non_finite_dropped,
-        };
-        let film = self.tracing.film_size().map(|[width, height]| format!("{width}x{height}")).unwrap_or_default();
+        let (readout, film) = (self.readout(), self.film_words());
         let mut state = lock(&self.shared.state);
         state.picture = Some(picture);
         state.readout = readout;
         state.film = film;
         state.mode = Some(look.controls.mode);
         drop(state);
-        (self.repaint)();
+        match self.untold.take() {
+            Some(text) => self.tell(text, true),
+            None => (self.repaint)(),
+        }
         Ok(())
+    }
+
+    fn readout(&self) -> Readout {
+        Readout {
+            samples: self.tracing.samples(),
+            samples_per_s: self.rate.per_second(),
+            spp_at_gaze: self.spp_at_gaze,
+            elapsed: self.tracing.elapsed(),
+            traced: self.traced,
+            non_finite_dropped: self.non_finite_dropped,
+        }
+    }
+
+    /// The film's size, such as `4096x2048`.
+    fn film_words(&self) -> String {
+        self.tracing.film_size().map(|[width, height]| format!("{width}x{height}")).unwrap_or_default()
     }
 
     /// The next request, waiting a little for one when there is nothing to trace.
     fn next_request(&self) -> Result<Option<Request>, Closed> {
         let up_to_date = |look: &Look| self.failed.as_ref() == Some(look) || look.controls.paused && !self.is_due(look);
-        let nothing_to_show = !self.tracing.is_open() || lock(&self.shared.look).as_ref().is_none_or(up_to_date);
+        let is_still = |look: &Look| self.headset.is_none() && up_to_date(look);
+        let nothing_to_show = !self.tracing.is_open() || lock(&self.shared.look).as_ref().is_none_or(is_still);
         let idle = nothing_to_show && lock(&self.shared.version).is_none();
         if idle {
             match self.inbox.recv_timeout(IDLE) {
@@ -419,6 +492,7 @@ impl Worker {
     }
 
     fn carry_out(&mut self, request: Request) {
+        let enters_headset = request == Request::EnterHeadset;
         let result = match request {
             Request::Restart => {
                 self.tracing.restart();
@@ -427,9 +501,15 @@ impl Worker {
                 self.rate = Rate::default();
                 Ok(None)
             }
+            Request::EnterHeadset => self.enter_headset(),
+            Request::LeaveHeadset => self.leave_headset(),
+            Request::ToggleMarker => {
+                self.toggle_marker();
+                Ok(None)
+            }
             Request::SavePng(path) => {
                 self.busy(Some(format!("saving {}", path.display())));
-                self.tracing.save_png(&path).map(|()| Some(format!("saved {}", path.display())))
+                self.save_png(&path).map(|()| Some(format!("saved {}", path.display())))
             }
             Request::SaveExr(path) => {
                 self.busy(Some(format!("saving {}", path.display())));
@@ -444,14 +524,27 @@ impl Worker {
         match result {
             Ok(Some(text)) => self.tell(text, false),
             Ok(None) => {}
+            // Without a headset the window goes on; until it has a picture there is nothing to say it over.
+            Err(error) if enters_headset && self.shown.is_none() => self.untold = Some(one_line(&error)),
             Err(error) => self.tell(one_line(&error), true),
+        }
+    }
+
+    /// The picture as it is shown: the headset's mirror while there is one.
+    fn save_png(&mut self, path: &Path) -> anyhow::Result<()> {
+        match (&self.headset, &self.mirror) {
+            (Some(_), Some((texture, _))) => {
+                let texels = readback::read_texture(&self.gpu, texture)?;
+                Ok(png::write(path, texture.width(), texture.height(), &texels)?)
+            }
+            _ => self.tracing.save_png(path),
         }
     }
 
     /// Reads the film back here and writes the file elsewhere: compressing a large film takes seconds.
     fn save_exr(&mut self, path: PathBuf) -> anyhow::Result<Option<String>> {
-        let shown = self.shown.as_ref().context("there is no picture yet")?;
-        let film = self.tracing.film(&shown.look)?;
+        let look = lock(&self.shared.look).clone().context("there is no picture yet")?;
+        let film = self.tracing.film(&look)?;
         let shared = Arc::clone(&self.shared);
         std::thread::Builder::new().name("save".into()).spawn(move || {
             let message = match exr::write(&path, &film) {

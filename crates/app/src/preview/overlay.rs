@@ -5,6 +5,7 @@ use std::time::Duration;
 use egui::{Align, Align2, Area, ComboBox, Context, DragValue, Grid, Id, Layout, Order, RichText, Slider, Ui};
 
 use super::controls::{Controls, MODES, Readout, Shown, TONE_MAPS, clock, metric};
+use super::engine::HeadsetReadout;
 use super::theme;
 use crate::cli::choices::{Clip, EccentricityAt, Mode, Model};
 
@@ -12,7 +13,7 @@ use crate::cli::choices::{Clip, EccentricityAt, Mode, Model};
 const PANEL_WIDTH: f32 = 236.0;
 
 /// What the keys do, as `?` lists them.
-pub const KEYS: [(&str, &str); 16] = [
+pub const KEYS: [(&str, &str); 17] = [
     ("Drag", "look around"),
     ("Wheel", "zoom at the pointer"),
     ("W A S D  Q E", "fly; Shift: faster"),
@@ -23,6 +24,7 @@ pub const KEYS: [(&str, &str); 16] = [
     ("R", "restart"),
     ("F", "ring at the fovea"),
     ("G", "gaze: sources, drift, recording"),
+    ("V", "into the headset and out"),
     ("X", "sample density"),
     ("[  ]", "exposure"),
     ("Ctrl S", "save the picture as PNG"),
@@ -61,6 +63,10 @@ pub enum Action {
     SaveExr,
     /// Go to a camera of the file.
     Camera(usize),
+    /// Show the scene in the headset.
+    EnterHeadset,
+    /// Show it in the window alone.
+    LeaveHeadset,
 }
 
 /// What the panel shows and cannot change.
@@ -82,6 +88,8 @@ pub struct Facts<'a> {
     pub notes: &'a [String],
     /// Figures.
     pub readout: Readout,
+    /// The headset while it is in use.
+    pub headset: Option<&'a HeadsetReadout>,
     /// Degrees at the eye of a pixel at the centre.
     pub deg_per_px: f32,
 }
@@ -99,6 +107,7 @@ pub fn panel(ctx: &Context, facts: &Facts<'_>, controls: &mut Controls, visibili
             picture(ui, controls);
             cameras(ui, facts, &mut actions);
             buttons(ui, controls, &mut actions);
+            headset(ui, facts.headset, &mut actions);
             ui.separator();
             ui.collapsing("Sampling and screen", |ui| sampling(ui, facts, controls, visibility));
             notes(ui, facts.notes);
@@ -205,6 +214,31 @@ fn buttons(ui: &mut Ui, controls: &mut Controls, actions: &mut Vec<Action>) {
             }
         }
     });
+}
+
+fn headset(ui: &mut Ui, headset: Option<&HeadsetReadout>, actions: &mut Vec<Action>) {
+    let Some(headset) = headset else {
+        let hint = "V: shows the panorama in a headset, by OpenXR";
+        if ui.button("Enter VR").on_hover_text(hint).clicked() {
+            actions.push(Action::EnterHeadset);
+        }
+        return;
+    };
+    ui.horizontal(|ui| {
+        if ui.button("Leave VR").on_hover_text("V").clicked() {
+            actions.push(Action::LeaveHeadset);
+        }
+        ui.add(egui::Label::new(&headset.words).truncate()).on_hover_text(&headset.runtime);
+    });
+    let age = headset.gaze_age.map(|age| format!(", {:.0} ms old", age.as_secs_f64() * 1e3)).unwrap_or_default();
+    let lines = [
+        headset.system.clone(),
+        format!("Gaze: {}{age}", headset.gaze_from),
+        format!("{} frames, {} missed", headset.frames, headset.missed),
+    ];
+    for line in lines {
+        ui.add(egui::Label::new(RichText::new(line).small().weak()).truncate());
+    }
 }
 
 fn sampling(ui: &mut Ui, facts: &Facts<'_>, controls: &mut Controls, visibility: &mut Visibility) {

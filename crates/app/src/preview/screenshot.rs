@@ -123,6 +123,18 @@ impl Screenshot {
             "film": state.film,
             "mode": state.mode.map(mode_name),
             "gaze": gaze,
+            "headset": state.headset.as_ref().map(|headset| json!({
+                "runtime": headset.runtime,
+                "system": headset.system,
+                "state": headset.words,
+                "eye_tracker": headset.has_eye_tracker,
+                "gaze_from": headset.gaze_from,
+                "gaze_age_ms": headset.gaze_age.map(|age| age.as_secs_f64() * 1e3),
+                "frames": headset.frames,
+                "missed": headset.missed,
+                "refreshes": headset.refreshes,
+            })),
+            "message": state.message.as_ref().map(|message| &message.text),
         })
     }
 }

@@ -8,7 +8,7 @@ use anyhow::Context;
 use fovea_sampler::Inverse;
 use glam::{UVec2, Vec2, Vec3};
 use tracer::distribution::{Distribution, View as TracerView};
-use tracer::film::FilmSnapshot;
+use tracer::film::{FilmMapping, FilmSnapshot};
 use tracer::gpu::Gpu;
 use tracer::renderer::{FilmPose, Renderer, RendererOptions};
 use tracer::scene::Scene;
@@ -17,7 +17,7 @@ use tracer::view::{DebugView, ViewProjection, ViewSettings};
 use super::controls::Shown;
 use super::engine::{Look, Picture};
 use crate::cli::PreviewArgs;
-use crate::cli::choices::Mode;
+use crate::cli::choices::{EccentricityAt, Mode};
 use crate::film::FilmPlan;
 use crate::output::exr::FilmFile;
 use crate::output::png;
@@ -29,6 +29,28 @@ use crate::view::View;
 
 /// The read-out at the gaze is a mean over so many pixels to each side.
 const READOUT_RADIUS_PX: u32 = 3;
+
+/// Where a head looks.
+#[derive(Clone, Copy, Debug)]
+pub struct HeadAim {
+    /// What both eyes see together.
+    pub view: TracerView,
+    /// Unit vector of the world in which the eyes look.
+    pub gaze: Vec3,
+    /// How far off that may be, degrees.
+    pub gaze_error_deg: f64,
+    /// Pixels of an eye's picture.
+    pub size_px: UVec2,
+}
+
+/// A film on its way to another device.
+#[derive(Clone, Debug)]
+pub struct Moved {
+    /// As it is on the host; `None` when it was empty.
+    pub film: Option<Arc<FilmSnapshot>>,
+    /// Whether it is what the old device had last.
+    pub is_newest: bool,
+}
 
 struct Open {
     scene: Arc<Scene>,
@@ -158,51 +180,61 @@ impl Tracing {
             screen_half_extent: mapping.half_size_mm / mapping.screen.distance_mm,
         };
         let memory = u64::from(self.args.film_memory) << 20;
-        let options = RendererOptions {
-            max_bounces: self.args.sampling.max_bounces,
-            seed: self.args.sampling.seed,
-            sequence: self.args.sampling.sequence.into(),
-            ..RendererOptions::default()
-        };
         let size = size_px.as_vec2();
-        let is_good = self.is_good(self.open.as_ref().and_then(|open| open.plan), &view, size);
-        let open = self.open.as_mut().context("no scene is open")?;
-        if !is_good {
+        if self.must_prepare(look) {
             let plan = FilmPlan::new(&view, size, memory);
-            if open.plan != Some(plan) {
-                let distribution = aim.distribution(&plan.options, plan.world_from_film, &inverse);
-                match &mut open.renderer {
-                    Some(renderer) => {
-                        renderer.set_film(plan.options)?;
-                        renderer.set_distribution(distribution)?;
-                    }
-                    None => {
-                        let options = RendererOptions { film: plan.options, ..options };
-                        let mut renderer = Renderer::new(&self.gpu, &options, distribution)?;
-                        renderer.set_scene(&open.scene)?;
-                        open.renderer = Some(renderer);
-                    }
-                }
-                open.plan = Some(plan);
-                self.keeps_film = false;
-                self.aim = Some(aim);
-                self.traced = Duration::ZERO;
+            if self.open.as_ref().context("no scene is open")?.plan != Some(plan) {
+                self.set_plan(plan, aim, &inverse)?;
             }
         }
-        let (Some(renderer), Some(plan)) = (&mut open.renderer, open.plan) else { return Ok(false) };
-        let pose = FilmPose { position: standpoint.position, world_from_film: plan.world_from_film };
+        let moved = self.set_pose_and_aim(standpoint.position, aim, &inverse)?;
+        let turned = self.view != Some(view);
+        self.view = Some(view);
+        Ok(moved || turned)
+    }
+
+    /// Puts an empty film of another plan in the place of the present one, if there is one.
+    fn set_plan(&mut self, plan: FilmPlan, aim: Aim, inverse: &Arc<Inverse>) -> anyhow::Result<()> {
+        let open = self.open.as_mut().context("no scene is open")?;
+        let distribution = aim.distribution(&plan.options, plan.world_from_film, inverse);
+        match &mut open.renderer {
+            Some(renderer) => {
+                renderer.set_film(plan.options)?;
+                renderer.set_distribution(distribution)?;
+            }
+            None => {
+                let options = RendererOptions {
+                    film: plan.options,
+                    max_bounces: self.args.sampling.max_bounces,
+                    seed: self.args.sampling.seed,
+                    sequence: self.args.sampling.sequence.into(),
+                };
+                let mut renderer = Renderer::new(&self.gpu, &options, distribution)?;
+                renderer.set_scene(&open.scene)?;
+                open.renderer = Some(renderer);
+            }
+        }
+        open.plan = Some(plan);
+        self.keeps_film = false;
+        self.aim = Some(aim);
+        self.traced = Duration::ZERO;
+        Ok(())
+    }
+
+    /// True when the film starts anew because it is seen from elsewhere.
+    fn set_pose_and_aim(&mut self, position: Vec3, aim: Aim, inverse: &Arc<Inverse>) -> anyhow::Result<bool> {
+        let Some(Open { renderer: Some(renderer), plan: Some(plan), .. }) = &mut self.open else { return Ok(false) };
+        let pose = FilmPose { position, world_from_film: plan.world_from_film };
         let moved = renderer.pose() != pose;
         if moved {
             renderer.set_pose(pose);
             self.traced = Duration::ZERO;
         }
-        if self.aim.is_none_or(|last| last.differs(&aim)) || !Arc::ptr_eq(renderer.distribution().inverse(), &inverse) {
-            renderer.set_distribution(aim.distribution(&plan.options, plan.world_from_film, &inverse))?;
+        if self.aim.is_none_or(|last| last.differs(&aim)) || !Arc::ptr_eq(renderer.distribution().inverse(), inverse) {
+            renderer.set_distribution(aim.distribution(&plan.options, plan.world_from_film, inverse))?;
             self.aim = Some(aim);
         }
-        let turned = self.view != Some(view);
-        self.view = Some(view);
-        Ok(moved || turned)
+        Ok(moved)
     }
 
     fn inverse(&mut self, acuity: Acuity) -> anyhow::Result<Arc<Inverse>> {
@@ -214,6 +246,74 @@ impl Tracing {
                 Ok(inverse)
             }
         }
+    }
+
+    /// Brings film, pose and distribution in line with a head that turns in a panorama. True when the film is another.
+    pub fn follow_head(&mut self, look: &Look, head: &HeadAim) -> anyhow::Result<bool> {
+        let HeadAim { view, gaze, gaze_error_deg, size_px } = *head;
+        let controls = &look.controls;
+        let inverse = self.inverse(Acuity { gaze_error_deg, ..controls.acuity })?;
+        let aim = Aim {
+            mode: controls.mode,
+            view,
+            gaze: GazePoint::towards(gaze, &view),
+            clip: controls.clip,
+            // Before the eyes, the angle in the scene is the angle at the eye.
+            eccentricity: EccentricityAt::Scene,
+            screen_half_extent: Vec2::ONE,
+        };
+        let widest = self.gpu.device.limits().max_texture_dimension_2d;
+        let fits = |plan: FilmPlan| plan.options.mapping == FilmMapping::Equirect && plan.options.width <= widest;
+        let plan = self.open.as_ref().context("no scene is open")?.plan;
+        let mut changed = false;
+        if !plan.is_some_and(fits) {
+            let memory = u64::from(self.args.film_memory) << 20;
+            let [hfov, vfov] = view.half_extent.to_array().map(|tangent| 2.0 * tangent.atan());
+            let plan = FilmPlan::panorama(&View::new(0.0, 0.0, hfov, vfov), size_px.as_vec2(), memory, widest);
+            self.set_plan(plan, aim, &inverse)?;
+            changed = true;
+        }
+        Ok(self.set_pose_and_aim(look.standpoint.position, aim, &inverse)? || changed)
+    }
+
+    /// Goes on with scene and film on another device. Where the old one does not give its film back, the film is the one
+    /// that was kept, if one was. Where the scene does not fit the new device, all stays as it is.
+    pub fn move_to(&mut self, gpu: Gpu, kept: Option<Arc<FilmSnapshot>>) -> anyhow::Result<Moved> {
+        let newest = self.snapshot();
+        let is_newest = newest.is_ok();
+        let film = newest.map_or(kept, |film| film.map(Arc::new));
+        let before = std::mem::replace(&mut self.gpu, gpu);
+        match &film {
+            Some(film) => {
+                if let Err(error) = self.go_on(film) {
+                    self.gpu = before;
+                    return Err(error);
+                }
+            }
+            None => self.give_up_film(),
+        }
+        self.target = None;
+        Ok(Moved { film, is_newest })
+    }
+
+    /// Gives the present film up; the next one is made on this device.
+    pub fn start_anew_on(&mut self, gpu: Gpu) {
+        self.gpu = gpu;
+        self.target = None;
+        self.give_up_film();
+    }
+
+    fn give_up_film(&mut self) {
+        if let Some(open) = &mut self.open {
+            (open.renderer, open.plan) = (None, None);
+        }
+        self.keeps_film = false;
+    }
+
+    /// A number that no picture has had.
+    pub fn next_generation(&mut self) -> u64 {
+        self.generations += 1;
+        self.generations
     }
 
     /// Traces a batch of at most so many samples and waits for it. How many there were, and how long they took.
@@ -297,7 +397,8 @@ impl Tracing {
         Ok(FilmFile::new(film, settings))
     }
 
-    fn renderer(&mut self) -> anyhow::Result<&mut Renderer> {
+    /// The renderer, once a film is planned.
+    pub fn renderer(&mut self) -> anyhow::Result<&mut Renderer> {
         self.open.as_mut().and_then(|open| open.renderer.as_mut()).context("no scene is open")
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use egui::{Color32, Context, Key, Modifiers, Rect, Sense, Ui};
-use glam::{Quat, UVec2};
+use glam::{Quat, UVec2, Vec2};
 use tracer::film::{FilmHeader, FilmMapping, FilmSnapshot};
 
 use super::controls::{Controls, MODES, Shown};
@@ -53,6 +53,8 @@ pub struct Window {
     screenshot: Option<Screenshot>,
     /// A film to go on with once its scene is open.
     resumed: Option<Arc<FilmSnapshot>>,
+    /// Presses of the headset's mode button that have been followed.
+    mode_presses: u64,
 }
 
 impl Window {
@@ -80,6 +82,7 @@ impl Window {
             texture: None,
             screenshot,
             resumed: None,
+            mode_presses: 0,
         }
     }
 
@@ -102,7 +105,7 @@ impl Window {
         if let Some(film) = film {
             engine.request(Request::GoOn(film));
         }
-        (self.engine, self.adapter, self.texture) = (engine, adapter, None);
+        (self.engine, self.adapter, self.texture, self.mode_presses) = (engine, adapter, None, 0);
         self.note =
             Some(Message::now("the graphics device was lost; the film goes on from its last snapshot".into(), false));
     }
@@ -168,7 +171,7 @@ impl Window {
         ui.painter().image(id, rect, whole, Color32::WHITE);
     }
 
-    fn look(&self, ctx: &Context, rect: Rect, gaze: Gaze) -> Option<(Look, f32)> {
+    fn look(&self, ctx: &Context, rect: Rect, gaze: Gaze, pointer: Option<Vec2>) -> Option<(Look, f32)> {
         let (_, navigation) = self.scene.as_ref()?;
         let monitor = ctx.input(|input| input.viewport().monitor_size);
         let mapping = ScreenMapping::new(self.controls.screen, rect, monitor);
@@ -179,6 +182,7 @@ impl Window {
             controls: self.controls.clone(),
             mapping,
             size_px: UVec2::new(pixels.x.round().max(1.0) as u32, pixels.y.round().max(1.0) as u32),
+            pointer,
         };
         Some((look, mapping.deg_per_px(rect, ctx.pixels_per_point())))
     }
@@ -195,6 +199,7 @@ impl Window {
                 camera: self.camera,
                 notes: &scene.notes,
                 readout: state.readout,
+                headset: state.headset.as_ref(),
                 deg_per_px,
             };
             for action in overlay::panel(ctx, &facts, &mut self.controls, &mut self.visibility) {
@@ -258,6 +263,8 @@ impl Window {
             Action::SavePng => self.engine.request(Request::SavePng(self.free_name("png"))),
             Action::SaveExr => self.engine.request(Request::SaveExr(self.free_name("exr"))),
             Action::Camera(index) => self.jump(index),
+            Action::EnterHeadset => self.engine.request(Request::EnterHeadset),
+            Action::LeaveHeadset => self.engine.request(Request::LeaveHeadset),
         }
     }
 
@@ -275,7 +282,7 @@ impl Window {
         }
     }
 
-    fn keys(&mut self, ctx: &Context) {
+    fn keys(&mut self, ctx: &Context, in_headset: bool) {
         if ctx.egui_wants_keyboard_input() {
             return;
         }
@@ -294,7 +301,14 @@ impl Window {
             self.controls.mode = next_mode(self.controls.mode);
         }
         if plain(Key::F) {
-            self.visibility.ring = !self.visibility.ring;
+            if in_headset {
+                self.engine.request(Request::ToggleMarker);
+            } else {
+                self.visibility.ring = !self.visibility.ring;
+            }
+        }
+        if plain(Key::V) {
+            self.act(if in_headset { Action::LeaveHeadset } else { Action::EnterHeadset });
         }
         if plain(Key::X) {
             let density = self.controls.shown == Shown::Density;
@@ -322,6 +336,14 @@ impl Window {
         }
     }
 
+    /// What was pressed in the headset counts as if it had been here.
+    fn follow_presses(&mut self, state: &State) {
+        while self.mode_presses < state.mode_presses {
+            self.mode_presses += 1;
+            self.controls.mode = next_mode(self.controls.mode);
+        }
+    }
+
     fn open_dropped_file(&self, ctx: &Context) {
         let dropped = ctx.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_owned()));
         if let Some(path) = dropped {
@@ -340,7 +362,8 @@ impl eframe::App for Window {
         let rect = ui.max_rect();
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
         self.follow_loader(&ctx, rect);
-        self.keys(&ctx);
+        self.keys(&ctx, state.headset.is_some());
+        self.follow_presses(&state);
         if let Some((_, navigation)) = &mut self.scene {
             navigation.update(ui, &response);
         }
@@ -356,10 +379,12 @@ impl eframe::App for Window {
         }
         self.show_picture(ui, frame, &state, rect);
         let mut deg_per_px = 0.0;
+        let pointer = gaze::pointer(&response).map(|[x, y]| Vec2::new(x as f32, y as f32));
         let gaze = Gaze { point: target.map(|target| target.point).unwrap_or_default() };
-        if let Some((look, pixel)) = self.look(&ctx, rect, gaze) {
+        if let Some((look, pixel)) = self.look(&ctx, rect, gaze, pointer) {
             deg_per_px = pixel;
-            if self.visibility.ring && self.controls.mode == Mode::Fv {
+            // A headset's mirror has its own.
+            if self.visibility.ring && self.controls.mode == Mode::Fv && state.headset.is_none() {
                 ui.painter().extend(fovea_ring(&look.mapping, rect, gaze));
             }
             self.engine.look(look);

@@ -41,7 +41,7 @@ fn look(scene: &Scene, args: &PreviewArgs) -> Look {
     let mapping = ScreenMapping::new(controls.screen, rect, None);
     let navigation = Navigation::new(camera.position, camera.rotation, camera.vfov, 160.0 / 90.0, 4.0);
     let size_px = UVec2::new(160, 90);
-    Look { standpoint: navigation.standpoint, gaze: Gaze::default(), controls, mapping, size_px }
+    Look { standpoint: navigation.standpoint, gaze: Gaze::default(), controls, mapping, size_px, pointer: None }
 }
 
 const LINE: &str = "fovea --mode od --seed 3 --max-bounces 2 --film-memory 16 --background 0.5,0.75,1";

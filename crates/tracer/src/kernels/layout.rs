@@ -1,4 +1,5 @@
-//! Structures shared with the shaders: twins of `shaders/types.wesl` and `shaders/view/bindings.wesl`.
+//! Structures shared with the shaders: twins of `shaders/types.wesl`, `shaders/view/bindings.wesl` and
+//! `shaders/vr/bindings.wesl`.
 //!
 //! `tests/layout.rs` reflects the composed WGSL with naga and compares sizes, offsets and names with these.
 
@@ -254,6 +255,31 @@ shared! {
         stale_size: [u32; 2],
         gaze_in_view: [f32; 2],
         ring_tangent: f32,
+        pad_0: u32,
+    }
+
+    /// One pass over a level of the panorama.
+    struct PanoramaParams {
+        size: [u32; 2],
+        coarse_size: [u32; 2],
+        first_slab_pixel: u32,
+        confidence_samples: f32,
+        quanta_to_radiance: f32,
+        pad_0: u32,
+    }
+
+    /// What an eye sees of the panorama.
+    struct EyeParams {
+        film_from_eye: Columns3,
+        plane_origin: [f32; 2],
+        plane_size: [f32; 2],
+        size: [u32; 2],
+        panorama_size: [u32; 2],
+        gaze_in_eye: [f32; 3],
+        marker_radius: f32,
+        exposure: f32,
+        tone_map: u32,
+        linear_target: u32,
         pad_0: u32,
     }
 }

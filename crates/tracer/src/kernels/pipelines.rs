@@ -4,7 +4,7 @@ use std::{collections::HashMap, sync::Arc};
 
 use thiserror::Error;
 
-use super::{ComposeError, Kernel, KernelKey, compose};
+use super::{ComposeError, KernelKey, compose};
 
 /// Why a kernel has no pipeline.
 #[derive(Debug, Error)]
@@ -30,7 +30,7 @@ pub enum KernelError {
     },
 }
 
-/// A compiled kernel: compute, or the render pipeline of [`Kernel::Present`].
+/// A compiled kernel: compute, or a render pipeline where [`Kernel::draws`](super::Kernel::draws).
 #[derive(Debug)]
 pub struct Pipeline {
     kind: PipelineKind,
@@ -54,7 +54,7 @@ impl Pipeline {
         let text = compose(key)?;
         let module = naga::front::wgsl::parse_str(&text)
             .map_err(|error| KernelError::Wgsl { kernel: label.clone(), cause: error.emit_to_string(&text) })?;
-        let stages = if key.kernel == Kernel::Present {
+        let stages = if key.kernel.draws() {
             wgpu::ShaderStages::FRAGMENT | wgpu::ShaderStages::VERTEX
         } else {
             wgpu::ShaderStages::COMPUTE
@@ -145,7 +145,7 @@ impl Pipeline {
     /// Sets a compute pass to this kernel and dispatches it.
     ///
     /// # Panics
-    /// On the render pipeline of [`Kernel::Present`], which is a bug in this crate.
+    /// On a render pipeline, which is a bug in this crate.
     pub fn dispatch(
         &self,
         pass: &mut wgpu::ComputePass<'_>,
@@ -184,6 +184,10 @@ fn reflect(
     label: &str,
 ) -> Vec<(wgpu::BindGroupLayout, Vec<u32>)> {
     let mut groups: Vec<Vec<wgpu::BindGroupLayoutEntry>> = Vec::new();
+    let is_sampler =
+        |variable: &naga::GlobalVariable| matches!(module.types[variable.ty].inner, naga::TypeInner::Sampler { .. });
+    // Kernels without a sampler read texels alone, of formats that need not be filterable.
+    let filterable = module.global_variables.iter().any(|(_, variable)| is_sampler(variable));
     for (_, variable) in module.global_variables.iter() {
         let Some(binding) = variable.binding else { continue };
         let ty = match variable.space {
@@ -191,10 +195,11 @@ fn reflect(
             naga::AddressSpace::Storage { access } => buffer_type(wgpu::BufferBindingType::Storage {
                 read_only: !access.contains(naga::StorageAccess::STORE),
             }),
+            _ if is_sampler(variable) => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
             _ => {
                 let arrayed = matches!(module.types[variable.ty].inner, naga::TypeInner::Image { arrayed: true, .. });
                 wgpu::BindingType::Texture {
-                    sample_type: wgpu::TextureSampleType::Float { filterable: false },
+                    sample_type: wgpu::TextureSampleType::Float { filterable },
                     view_dimension: if arrayed {
                         wgpu::TextureViewDimension::D2Array
                     } else {
@@ -236,11 +241,11 @@ impl PipelineCache {
         self.get(device, key, None)
     }
 
-    /// The pipeline that presents to targets of this format.
+    /// The pipeline of a kernel that draws to targets of this format.
     ///
     /// # Errors
     /// When it does not compose or compile.
-    pub fn present(
+    pub fn drawn(
         &mut self,
         device: &wgpu::Device,
         key: &KernelKey,
