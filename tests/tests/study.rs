@@ -5,8 +5,14 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use fovea_app::{cli, commands};
+use fovea_app::{cli, commands, readback};
+use fovea_tests::device;
+use glam::Quat;
 use serde_json::Value;
+use tracer::distribution::{Distribution, View};
+use tracer::film::FilmOptions;
+use tracer::renderer::{Renderer, SequenceKind};
+use tracer::view::{DebugView, ToneMap, ViewProjection, ViewSettings};
 
 const SEEDS: usize = 2;
 const METHODS: [&str; 7] = ["od", "vp", "vp-region", "fv", "fv-eq6", "fv-clip", "fv-best"];
@@ -24,6 +30,42 @@ fn scratch() -> PathBuf {
     let folder = std::env::temp_dir().join(format!("fovea-study-{}", std::process::id()));
     let _ = std::fs::remove_dir_all(&folder);
     folder
+}
+
+/// Film and reconstructed view after a few samples, so that most of the view is filled from elsewhere.
+fn look(renderer: &mut Renderer) -> (Vec<u32>, Vec<[f32; 4]>) {
+    let words = device::trace(renderer, 256).unwrap().words;
+    let view = View::new(Quat::IDENTITY, 1.5, 1.5);
+    let settings = ViewSettings {
+        projection: ViewProjection::Perspective(view),
+        size: [24, 24],
+        exposure_ev: 0.0,
+        tone_map: ToneMap::Linear,
+        debug_view: DebugView::Beauty,
+        fill: true,
+        ring: None,
+    };
+    readback::draw(renderer, &settings).unwrap();
+    (words, renderer.view_radiance().unwrap())
+}
+
+#[test]
+fn other_random_numbers_leave_nothing_of_the_picture_before() {
+    let gpu = device::gpu();
+    let (scene, _) = tracer::builtin::scene().unwrap();
+    let film = FilmOptions::equirect(64, 32);
+    let with_seed = |seed| {
+        let distribution = Distribution::omnidirectional(device::inverse());
+        device::independent(&gpu, film, seed, 1, distribution, &scene)
+    };
+    let mut reused = with_seed(1);
+    let first = look(&mut reused);
+    reused.set_randomness(2, SequenceKind::Independent);
+    let second = look(&mut reused);
+    assert_eq!(second, look(&mut with_seed(2)));
+    assert_ne!(first.0, second.0);
+    assert_eq!(second.1.len(), 24 * 24);
+    assert!(second.1.iter().flatten().all(|value| value.is_finite()));
 }
 
 #[test]

@@ -210,6 +210,18 @@ mod tests {
     }
 
     #[test]
+    fn within_a_view_rows_are_taken_as_they_are() {
+        let path = std::env::temp_dir().join(format!("fovea-follow-{}.csv", std::process::id()));
+        std::fs::write(&path, "# gaze-trace v1; space=view_deg\n0,0,0,1\n1,30,0,1\n2,9,9,0\n3,0,-20,1\n").unwrap();
+        let steps = within_view(&path, &view(), 1 << 10).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!(steps.last().unwrap().samples, 1 << 10);
+        let sines: Vec<Vec3> = steps.iter().map(|step| step.gaze.direction).collect();
+        assert!(sines.iter().any(|d| (d.x - 0.5).abs() < 1e-5) && sines.iter().all(|d| d.x < 0.51 && d.y < 1e-6));
+        assert!(within_view(&path, &view(), 1).is_err());
+    }
+
+    #[test]
     fn few_samples_and_long_recordings_make_few_steps() {
         let gaze = GazePoint { direction: Vec3::NEG_Z, on_view: Vec2::ZERO };
         let long = vec![(0.01, gaze); 100_000];
