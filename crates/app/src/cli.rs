@@ -13,11 +13,13 @@ use crate::tev::TevAddress;
 pub mod choices;
 pub mod gaze;
 pub mod sampler;
+pub mod study;
 pub mod values;
 
 use choices::{Clip, EccentricityAt, Geometry, InverseForm, Mode, Model, Orient, Sequence, ToneMapping};
 use gaze::{GazeArgs, PreviewGazeArgs};
 use sampler::SamplerArgs;
+use study::StudyArgs;
 use values::{CameraChoice, FilmShape, GazeAngles, Rgb, SizeMm, SizePx, ViewAngles};
 
 /// Foveated progressive preview of glTF scenes: looks converge first where you look.
@@ -47,6 +49,8 @@ pub enum Command {
     Gaze(GazeArgs),
     /// Compare the sampler's inverses in error and speed, or evaluate one
     Sampler(SamplerArgs),
+    /// Measure how much sooner each mode converges where one looks, scene by scene
+    Study(StudyArgs),
 }
 
 /// `fovea [SCENE]`.

@@ -13,6 +13,7 @@ pub mod info;
 pub mod merge;
 pub mod render;
 pub mod sampler;
+pub mod study;
 
 /// Carries out a command line.
 ///
@@ -27,6 +28,7 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Some(Command::Adapters(args)) => adapters::run(&args),
         Some(Command::Gaze(args)) => gaze::run(&args),
         Some(Command::Sampler(args)) => sampler::run(&args),
+        Some(Command::Study(args)) => study::run(&args),
     }
 }
 

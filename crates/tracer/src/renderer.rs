@@ -408,6 +408,13 @@ impl Renderer {
         self.restored.clear();
     }
 
+    /// Starts the film anew with other random numbers; nothing of the old picture is shown.
+    pub fn set_randomness(&mut self, seed: u32, sequence: SequenceKind) {
+        (self.options.seed, self.options.sequence) = (seed, sequence);
+        self.view.forget();
+        self.restart();
+    }
+
     /// Samples in the film: traced since the last restart, and those of the snapshot that it was restored from.
     pub fn samples(&self) -> u64 {
         self.samples

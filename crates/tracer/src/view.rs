@@ -113,6 +113,12 @@ impl ViewRenderer {
         self.stale = Some((copy, view, self.size));
     }
 
+    /// Shows nothing of earlier pictures from now on.
+    pub fn forget(&mut self) {
+        self.stale = None;
+        self.last = None;
+    }
+
     /// The view that was presented last, row by row: radiance, and the weight that it was found with.
     pub fn finished(&self, gpu: &Gpu) -> Result<([u32; 2], Vec<[f32; 4]>), ReadError> {
         let Some(pyramid) = &self.pyramid else { return Ok(([0; 2], Vec::new())) };

@@ -29,7 +29,7 @@ use crate::tev::{TevLink, TevPicture};
 use crate::view::direction;
 use follow::Step;
 
-mod follow;
+pub(super) mod follow;
 mod resume;
 
 /// Samples a film pixel unless told otherwise.
@@ -205,7 +205,7 @@ fn with_trace(mut settings: Map<String, Value>, args: &RenderArgs) -> Map<String
 /// Steps of a progress bar.
 const BAR_STEPS: u64 = 1000;
 
-fn progress_bar() -> anyhow::Result<ProgressBar> {
+pub(super) fn progress_bar() -> anyhow::Result<ProgressBar> {
     let bar = if std::io::stderr().is_terminal() { ProgressBar::new(BAR_STEPS) } else { ProgressBar::hidden() };
     let style =
         ProgressStyle::with_template("{bar:40} {percent:>3} %  {elapsed} elapsed, {eta} left").context("style")?;

@@ -2,7 +2,7 @@
 
 mod adapter;
 mod cost;
-mod raster;
+pub(super) mod raster;
 
 use std::path::Path;
 

@@ -21,7 +21,21 @@ pub enum Mark {
     Sphere,
     /// An inverse on the plane.
     Plane,
+    /// One of several curves, by its number; colours repeat after eight.
+    Series(u8),
 }
+
+/// Colours of [`Mark::Series`], apart for most colour-blind eyes (Okabe and Ito 2008, yellow replaced by brown).
+const SERIES: [[u8; 3]; 8] = [
+    [0x00, 0x00, 0x00],
+    [0xe6, 0x9f, 0x00],
+    [0x8c, 0x56, 0x4b],
+    [0x00, 0x72, 0xb2],
+    [0xd5, 0x5e, 0x00],
+    [0x00, 0x9e, 0x73],
+    [0xcc, 0x79, 0xa7],
+    [0x56, 0xb4, 0xe9],
+];
 
 impl Mark {
     /// Red, green, blue.
@@ -32,6 +46,7 @@ impl Mark {
             Self::Grid => [0xdd, 0xdd, 0xdd],
             Self::Sphere => [0x00, 0x5f, 0xb8],
             Self::Plane => [0xc4, 0x4e, 0x00],
+            Self::Series(number) => SERIES[number as usize % SERIES.len()],
         }
     }
 }

@@ -46,6 +46,36 @@ pub fn steps(path: &Path, args: &RenderArgs, view: &View, total: u64) -> anyhow:
     Ok(shared_out(&looked, total))
 }
 
+/// A recording as steps of `total` samples, unfiltered, on a screen that shows the view and nothing else.
+///
+/// # Errors
+/// A file that is no trace or holds no valid row.
+pub fn within_view(path: &Path, view: &View, total: u64) -> anyhow::Result<Vec<Step>> {
+    let text = std::fs::read_to_string(path)?;
+    let trace = Trace::parse(&text)?;
+    let usual_secs = trace.duration_secs() / (trace.rows.len() - 1).max(1) as f64;
+    let ends = trace.rows.iter().skip(1).map(|row| Some(row.time_secs)).chain([None]);
+    let valid = trace.rows.iter().zip(ends).filter(|(row, _)| row.valid);
+    let looked: Vec<(f64, GazePoint)> = valid
+        .map(|(row, end)| {
+            let secs = end.map_or(usual_secs.max(1e-6), |end| end - row.time_secs);
+            let [x, y] = row.point.map(|value| value as f32);
+            let gaze = match trace.header.space {
+                Space::ViewDeg => {
+                    let in_view = direction(x.to_radians(), y.to_radians());
+                    GazePoint::towards(view.world_from_view * in_view, view)
+                }
+                Space::Screen01 => GazePoint::at(glam::Vec2::new(2.0 * x - 1.0, 1.0 - 2.0 * y), view),
+            };
+            (secs, gaze)
+        })
+        .collect();
+    if looked.is_empty() {
+        bail!("no row is valid");
+    }
+    Ok(shared_out(&looked, total))
+}
+
 /// Filtered gaze, each with the seconds for which it holds. Rows before the first valid one are left out.
 fn looked(trace: &Trace, args: &RenderArgs, view: &View) -> Vec<(f64, GazePoint)> {
     let place = place(trace, args);
@@ -177,6 +207,18 @@ mod tests {
         assert!(steps.windows(2).all(|pair| pair[0].samples < pair[1].samples));
         let left = steps.iter().rfind(|step| step.gaze.on_view.x < 0.0).unwrap().samples;
         assert!((left as f64 / total as f64 - 0.25).abs() < 0.01, "{left}");
+    }
+
+    #[test]
+    fn within_a_view_rows_are_taken_as_they_are() {
+        let path = std::env::temp_dir().join(format!("fovea-follow-{}.csv", std::process::id()));
+        std::fs::write(&path, "# gaze-trace v1; space=view_deg\n0,0,0,1\n1,30,0,1\n2,9,9,0\n3,0,-20,1\n").unwrap();
+        let steps = within_view(&path, &view(), 1 << 10).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!(steps.last().unwrap().samples, 1 << 10);
+        let sines: Vec<Vec3> = steps.iter().map(|step| step.gaze.direction).collect();
+        assert!(sines.iter().any(|d| (d.x - 0.5).abs() < 1e-5) && sines.iter().all(|d| d.x < 0.51 && d.y < 1e-6));
+        assert!(within_view(&path, &view(), 1).is_err());
     }
 
     #[test]

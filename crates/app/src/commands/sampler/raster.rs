@@ -16,7 +16,7 @@ struct Canvas {
 }
 
 /// Size in pixels and texels, row by row from the top.
-pub(super) fn draw(chart: &Chart) -> ([u32; 2], Vec<[u8; 4]>) {
+pub(in crate::commands) fn draw(chart: &Chart) -> ([u32; 2], Vec<[u8; 4]>) {
     let [width, height] = chart.size_px.map(|side| (side * SCALE) as i64);
     let mut canvas = Canvas { width, height, texels: vec![[255; 4]; (width * height) as usize] };
     for shape in &chart.shapes {

@@ -1,0 +1,113 @@
+//! `fovea study` on the built-in scene, small: all outputs are there, finished parts are not repeated, and its numbers agree
+//! with one another.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use fovea_app::{cli, commands, readback};
+use fovea_tests::device;
+use glam::Quat;
+use serde_json::Value;
+use tracer::distribution::{Distribution, View};
+use tracer::film::FilmOptions;
+use tracer::renderer::{Renderer, SequenceKind};
+use tracer::view::{DebugView, ToneMap, ViewProjection, ViewSettings};
+
+const SEEDS: usize = 2;
+const METHODS: [&str; 7] = ["od", "vp", "vp-region", "fv", "fv-eq6", "fv-clip", "fv-best"];
+
+fn study(folder: &Path, more: &str) -> Result<(), String> {
+    let line = format!(
+        "fovea study --film 64x32 --seeds {SEEDS} --spp 1 --reference-spp 2 --max-bounces 1 --gaze 0,0 --gaze 20,-30 {more} --out"
+    );
+    let words = line.split_whitespace().map(OsString::from).chain([folder.into()]);
+    let parsed = cli::parse(words).map_err(|stop| format!("{stop:?}"))?;
+    commands::run(parsed).map_err(|error| format!("{error:#}"))
+}
+
+fn scratch() -> PathBuf {
+    let folder = std::env::temp_dir().join(format!("fovea-study-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&folder);
+    folder
+}
+
+/// Film and reconstructed view after a few samples, so that most of the view is filled from elsewhere.
+fn look(renderer: &mut Renderer) -> (Vec<u32>, Vec<[f32; 4]>) {
+    let words = device::trace(renderer, 256).unwrap().words;
+    let view = View::new(Quat::IDENTITY, 1.5, 1.5);
+    let settings = ViewSettings {
+        projection: ViewProjection::Perspective(view),
+        size: [24, 24],
+        exposure_ev: 0.0,
+        tone_map: ToneMap::Linear,
+        debug_view: DebugView::Beauty,
+        fill: true,
+        ring: None,
+    };
+    readback::draw(renderer, &settings).unwrap();
+    (words, renderer.view_radiance().unwrap())
+}
+
+#[test]
+fn other_random_numbers_leave_nothing_of_the_picture_before() {
+    let gpu = device::gpu();
+    let (scene, _) = tracer::builtin::scene().unwrap();
+    let film = FilmOptions::equirect(64, 32);
+    let with_seed = |seed| {
+        let distribution = Distribution::omnidirectional(device::inverse());
+        device::independent(&gpu, film, seed, 1, distribution, &scene)
+    };
+    let mut reused = with_seed(1);
+    let first = look(&mut reused);
+    reused.set_randomness(2, SequenceKind::Independent);
+    let second = look(&mut reused);
+    assert_eq!(second, look(&mut with_seed(2)));
+    assert_ne!(first.0, second.0);
+    assert_eq!(second.1.len(), 24 * 24);
+    assert!(second.1.iter().flatten().all(|value| value.is_finite()));
+}
+
+#[test]
+fn a_small_study_leaves_all_its_outputs_and_goes_on_from_them() {
+    let folder = scratch();
+    study(&folder, "").unwrap();
+    let plots = ["samples", "time", "rings", "whole"].map(|name| format!("{name}-builtin"));
+    let pictures =
+        plots.iter().map(String::as_str).chain(["splits"]).flat_map(|n| [format!("{n}.svg"), format!("{n}.png")]);
+    let others = ["study.md", "study.json", "curves.csv", "rates.csv", "provenance.json", "figure-builtin.png"];
+    for name in pictures.chain(others.map(String::from)) {
+        assert!(folder.join(&name).metadata().is_ok_and(|file| file.len() > 100), "{name}");
+    }
+    let page = std::fs::read_to_string(folder.join("study.md")).unwrap();
+    assert!(!page.contains('{'), "a place of the page was not filled");
+
+    // Rows: every method, gaze and seed, each with its schedule.
+    let rows = std::fs::read_to_string(folder.join("curves.csv")).unwrap();
+    for method in METHODS {
+        for gaze in ["0_0", "20_-30"] {
+            for seed in 1..=SEEDS {
+                let prefix = format!("builtin,{gaze},{method},{seed},");
+                assert!(rows.lines().filter(|line| line.starts_with(&prefix)).count() >= 7, "{prefix}");
+            }
+        }
+    }
+    let summary: Value = serde_json::from_str(&std::fs::read_to_string(folder.join("study.json")).unwrap()).unwrap();
+    assert_eq!(summary["sights"].as_array().unwrap().len(), 2);
+    assert_eq!(summary["settings"]["builtin"]["film"], serde_json::json!([64, 32]));
+
+    // A lost run is rendered again to the same bytes, the others are left.
+    let lost = folder.join("runs").join("builtin_0_0_fv_2.csv");
+    let kept = folder.join("runs").join("builtin_0_0_vp_1.csv");
+    let bytes = std::fs::read(&lost).unwrap();
+    let written = kept.metadata().unwrap().modified().unwrap();
+    std::fs::remove_file(&lost).unwrap();
+    study(&folder, "--only curves").unwrap();
+    assert_eq!(std::fs::read(&lost).unwrap(), bytes);
+    assert_eq!(kept.metadata().unwrap().modified().unwrap(), written);
+
+    // Other settings do not mix with these.
+    let refused = study(&folder, "--only curves --background 1,0,0").unwrap_err();
+    assert!(refused.contains("other settings"), "{refused}");
+    std::fs::remove_dir_all(folder).unwrap();
+}
