@@ -17,7 +17,9 @@ use gaze_control::GazeControl;
 use screenshot::{Outcome, Screenshot};
 use window::Window;
 
+pub mod attention_tools;
 pub mod controls;
+pub mod editor;
 pub mod engine;
 pub mod gaze;
 pub mod gaze_control;
@@ -46,7 +48,8 @@ pub fn run(args: PreviewArgs) -> anyhow::Result<()> {
     let outcome = Outcome::default();
     let options = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
-            .with_title(format!("{} - Fovea", source.name()))
+            // The scene's name comes when it is open.
+            .with_title("Fovea")
             .with_app_id("fovea")
             .with_inner_size([args.window.width as f32, args.window.height as f32])
             .with_min_inner_size([320.0, 240.0])

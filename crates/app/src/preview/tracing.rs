@@ -15,8 +15,10 @@ use tracer::view::{DebugView, ViewProjection, ViewSettings};
 
 use super::controls::Shown;
 use super::engine::{Look, Picture};
+use crate::attention::Attention;
 use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
+use crate::convergence::Block;
 use crate::film::FilmPlan;
 use crate::output::exr::FilmFile;
 use crate::output::png;
@@ -48,6 +50,9 @@ pub struct Tracing {
     generations: u64,
     inverse: Option<(Acuity, Arc<Inverse>)>,
     aim: Option<Aim>,
+    /// What the lists below were made for.
+    attention: Option<(Attention, FilmPlan)>,
+    wanted_pixels: Vec<Arc<[u32]>>,
     view: Option<View>,
     traced: Duration,
 }
@@ -63,6 +68,8 @@ impl Tracing {
             generations: 0,
             inverse: None,
             aim: None,
+            attention: None,
+            wanted_pixels: Vec::new(),
             view: None,
             traced: Duration::ZERO,
         }
@@ -149,8 +156,15 @@ impl Tracing {
             renderer.set_pose(pose);
             self.traced = Duration::ZERO;
         }
-        if self.aim.is_none_or(|last| last.differs(&aim)) || !Arc::ptr_eq(renderer.distribution().inverse(), &inverse) {
-            renderer.set_distribution(aim.distribution(&plan.options, plan.world_from_film, &inverse))?;
+        let wants = self.attention.as_ref().is_none_or(|(last, of)| *last != controls.attention || *of != plan);
+        if wants {
+            self.wanted_pixels = controls.attention.lists(&plan.options, plan.world_from_film);
+            self.attention = Some((controls.attention.clone(), plan));
+        }
+        let aims = self.aim.is_none_or(|last| last.differs(&aim));
+        if wants || aims || !Arc::ptr_eq(renderer.distribution().inverse(), &inverse) {
+            let mode = aim.distribution(&plan.options, plan.world_from_film, &inverse);
+            renderer.set_distribution(controls.attention.mixed(mode, &self.wanted_pixels))?;
             self.aim = Some(aim);
         }
         let turned = self.view != Some(view);
@@ -226,9 +240,9 @@ impl Tracing {
         Ok(self.renderer()?.statistics()?.non_finite.into())
     }
 
-    /// Mean samples of the film pixels about a direction.
-    pub fn samples_at(&mut self, direction: Vec3) -> anyhow::Result<f32> {
-        Ok(self.renderer()?.samples_near(direction, READOUT_RADIUS_PX)?)
+    /// What the film pixels about a direction say.
+    pub fn block_at(&mut self, direction: Vec3) -> anyhow::Result<Block> {
+        Ok(Block::new(&self.renderer()?.pixels_near(direction, READOUT_RADIUS_PX)?))
     }
 
     /// Writes the picture as it is shown.
