@@ -21,6 +21,7 @@ pub mod sampling;
 pub mod screen;
 pub mod session;
 pub mod settings;
+pub mod split_times;
 pub mod tev;
 pub mod view;
 

@@ -29,6 +29,7 @@ pub mod open_scene;
 pub mod overlay;
 pub mod pacing;
 pub mod screenshot;
+pub mod split_panel;
 pub mod theme;
 pub mod tracing;
 pub mod window;

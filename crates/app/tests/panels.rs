@@ -20,6 +20,7 @@ use fovea_app::preview::controls::Controls;
 use fovea_app::preview::editor::panel::{self, Action, PanelState, Tab};
 use fovea_app::preview::gaze_control::GazeControl;
 use fovea_app::preview::overlay::{self, Facts, Visibility};
+use fovea_app::preview::split_panel::{self, SplitTimes};
 use fovea_app::preview::{gaze_panel, theme};
 use fovea_app::session::{self, Source};
 
@@ -235,6 +236,7 @@ fn without_changes_there_is_nothing_to_undo_or_save() {
 fn the_settings_can_be_operated_by_keyboard() {
     let notes = ["something was not supported".to_owned()];
     let cameras = ["front".to_owned(), "above".to_owned()];
+    let mut split = SplitTimes::default();
     let mut tools = ToolState { tool: Tool::Brush, ..ToolState::default() };
     let state = (Controls::from(&args()), Visibility::default(), Vec::new());
     let draw = move |ui: &mut egui::Ui, (controls, visibility, asked): &mut (Controls, Visibility, Vec<_>)| {
@@ -249,11 +251,11 @@ fn the_settings_can_be_operated_by_keyboard() {
             gaze: Some(glam::Vec3::Z),
             ..Facts::default()
         };
-        asked.extend(overlay::panel(ui.ctx(), &facts, controls, &mut tools, visibility));
+        asked.extend(overlay::panel(ui.ctx(), &facts, controls, &mut tools, &mut split, visibility));
     };
     let mut harness = harness(draw, state);
     assert_reachable(&mut harness, "settings");
-    for section in ["Sampling and screen", "Attention", "Pixel at the gaze"] {
+    for section in ["Sampling and screen", "Attention", "Split times", "Pixel at the gaze"] {
         harness.get_by_label(section).click();
         harness.run_steps(10);
         assert_reachable(&mut harness, section);
@@ -304,4 +306,41 @@ fn notes_say_what_they_are_told() {
     harness.get_by_label("Cancel").click();
     harness.run_steps(2);
     assert!(*harness.state());
+}
+
+#[test]
+fn a_run_of_split_times_goes_through_its_modes_and_writes_its_results() {
+    let folder = std::env::temp_dir().join(format!("fovea-split-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    let place = folder.clone();
+    let mut split = SplitTimes::default();
+    split.plan.repetitions = 1;
+    let modes = split.plan.modes.len();
+    let first = split.start(5, Instant::now());
+    assert!(matches!(first, Some(split_panel::Action::Show(_))) && split.hides_mode());
+    let draw = move |ui: &mut egui::Ui, (split, told): &mut (SplitTimes, Vec<split_panel::Action>)| {
+        let scene = split_panel::Scene { name: "room.glb", adapter: "an adapter", folder: &place };
+        told.extend(split.keys(ui.ctx(), Instant::now(), (1000, [0.0, 0.0]), &scene));
+        split.banner(ui.ctx());
+    };
+    let mut harness = harness(draw, (split, Vec::new()));
+    for _ in 0..modes {
+        assert!(harness.query_by_label("O: the outline is visible").is_some());
+        // Too early for the material.
+        for key in [egui::Key::P, egui::Key::O] {
+            harness.key_press(key);
+            harness.run_steps(2);
+        }
+        assert!(harness.query_by_label("P: the material is visible").is_some());
+        harness.key_press(egui::Key::P);
+        harness.run_steps(2);
+    }
+    let (split, told) = harness.state();
+    assert_eq!(told.len(), modes);
+    assert!(matches!(told.last(), Some(split_panel::Action::Tell(_, false))) && !split.hides_mode(), "{told:?}");
+    let csv = std::fs::read_to_string(folder.join("split-times-1.csv")).unwrap();
+    assert_eq!(csv.lines().filter(|line| line.contains(",room.glb,")).count(), modes);
+    assert!(folder.join("split-times-1.svg").exists());
+    std::fs::remove_dir_all(folder).unwrap();
 }

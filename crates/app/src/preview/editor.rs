@@ -303,18 +303,19 @@ impl Editor {
         self.document.edit(&Edit::ShowAll, Gesture::Once);
     }
 
+    /// What is selected, in words; empty for nothing.
+    pub fn selected_name(&self) -> String {
+        self.panel.selected.map(|part| properties::title(&self.document, part)).unwrap_or_default()
+    }
+
     /// Figures for a screenshot's report.
     pub fn figures(&self) -> serde_json::Value {
-        let selected = match self.panel.selected {
-            Some(Part::Node(node)) => panel::node_name(&self.document, node),
-            other => other.map(|part| format!("{part:?}")).unwrap_or_default(),
-        };
         let pivot = match self.panel.selected {
             Some(Part::Node(node)) => properties::own_axes(&self.document, node).0,
             _ => Vec3::ZERO,
         };
         serde_json::json!({
-            "selected": selected,
+            "selected": self.selected_name(),
             "pivot_m": pivot.to_array(),
             "edits": self.document.to_json(),
             "unsaved": self.document.is_unsaved(),

@@ -1,12 +1,13 @@
 //! What lies over the picture: settings, figures, notes and the list of keys.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use egui::{Align, Align2, Area, ComboBox, Context, DragValue, Grid, Id, Layout, Order, RichText, Slider, Ui};
 use glam::Vec3;
 
 use super::attention_tools::{self, ToolState};
 use super::controls::{Controls, MODES, Readout, Shown, TONE_MAPS, clock, metric};
+use super::split_panel::{self, SplitTimes};
 use super::theme;
 use crate::cli::choices::{Clip, EccentricityAt, Mode, Model};
 use crate::convergence::Progress;
@@ -18,7 +19,7 @@ const OUTLINE_HINT: &str = "Ready: at the gaze, noise is below 20 % of the brigh
 const MATERIAL_HINT: &str = "Ready: at the gaze, noise is below 5 % of the brightness (95 % confidence)";
 
 /// What the keys do, as `?` lists them.
-pub const KEYS: [(&str, &str); 26] = [
+pub const KEYS: [(&str, &str); 27] = [
     ("Drag", "look around; on a handle: move, turn or scale"),
     ("Click", "select what is there"),
     ("Wheel", "zoom at the pointer"),
@@ -39,6 +40,7 @@ pub const KEYS: [(&str, &str); 26] = [
     ("F", "ring at the fovea"),
     ("G", "gaze: sources, drift, recording"),
     ("L", "lock the gaze where it is, or free it"),
+    ("O  P", "split times: the outline, the material is visible"),
     ("X", "sample density"),
     ("[  ]", "exposure"),
     ("Ctrl S", "save the picture as PNG"),
@@ -69,7 +71,7 @@ impl Default for Visibility {
 }
 
 /// Something that a button or key asks for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Action {
     /// Start the film again.
     Restart,
@@ -79,6 +81,8 @@ pub enum Action {
     SaveExr,
     /// Go to a camera of the file.
     Camera(usize),
+    /// Go on with split times.
+    Split(split_panel::Action),
 }
 
 /// What the panel shows and cannot change.
@@ -104,6 +108,8 @@ pub struct Facts<'a> {
     pub deg_per_px: f32,
     /// The direction that one looks in, in the scene.
     pub gaze: Option<Vec3>,
+    /// What is selected, in words.
+    pub selected: &'a str,
 }
 
 /// Draws the panel.
@@ -112,6 +118,7 @@ pub fn panel(
     facts: &Facts<'_>,
     controls: &mut Controls,
     tools: &mut ToolState,
+    split: &mut SplitTimes,
     visibility: &mut Visibility,
 ) -> Vec<Action> {
     let mut actions = Vec::new();
@@ -128,6 +135,9 @@ pub fn panel(
             ui.separator();
             ui.collapsing("Attention", |ui| {
                 attention_tools::panel(ui, tools, &mut controls.attention, facts.gaze);
+            });
+            ui.collapsing("Split times", |ui| {
+                actions.extend(split.show(ui, facts.selected, Instant::now()).map(Action::Split));
             });
             ui.collapsing("Pixel at the gaze", |ui| pixel(ui, facts));
             ui.collapsing("Sampling and screen", |ui| sampling(ui, facts, controls, visibility));

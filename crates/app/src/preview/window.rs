@@ -19,6 +19,7 @@ use super::navigation::Navigation;
 use super::open_scene::OpenScene;
 use super::overlay::{self, Action, Facts, Visibility};
 use super::screenshot::Screenshot;
+use super::split_panel::{self, SplitTimes};
 use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
 use crate::cli::values::CameraChoice;
@@ -51,6 +52,7 @@ pub struct Window {
     /// The scene that the navigation moves in.
     scene: Option<(OpenScene, Navigation)>,
     tools: ToolState,
+    split: SplitTimes,
     /// Where one looks as far as tracing goes, in the scene.
     gaze_direction: Option<Vec3>,
     /// What is done with it.
@@ -85,6 +87,7 @@ impl Window {
             gaze,
             scene: None,
             tools: ToolState::default(),
+            split: SplitTimes::default(),
             gaze_direction: None,
             editor: None,
             given: None,
@@ -188,7 +191,10 @@ impl Window {
     }
 
     fn overlay(&mut self, ctx: &Context, state: &State, deg_per_px: f32) {
-        if let Some((scene, _)) = self.scene.as_ref().filter(|_| self.visibility.panel) {
+        self.split.banner(ctx);
+        let selected = self.editor.as_ref().map(Editor::selected_name).unwrap_or_default();
+        let shown = self.visibility.panel && !self.split.hides_mode();
+        if let Some((scene, _)) = self.scene.as_ref().filter(|_| shown) {
             let cameras: Vec<String> = scene.viewpoints.iter().map(|viewpoint| viewpoint.name.clone()).collect();
             let facts = Facts {
                 scene: &scene.name,
@@ -201,9 +207,10 @@ impl Window {
                 readout: state.readout,
                 deg_per_px,
                 gaze: self.gaze_direction,
+                selected: &selected,
             };
-            let (controls, tools) = (&mut self.controls, &mut self.tools);
-            for action in overlay::panel(ctx, &facts, controls, tools, &mut self.visibility) {
+            let (controls, tools, split) = (&mut self.controls, &mut self.tools, &mut self.split);
+            for action in overlay::panel(ctx, &facts, controls, tools, split, &mut self.visibility) {
                 self.act(action);
             }
         }
@@ -218,6 +225,17 @@ impl Window {
             overlay::keys(ctx);
         }
         self.message(ctx, state);
+    }
+
+    /// What the keys of a run of split times do.
+    fn split_keys(&mut self, ctx: &Context, state: &State) {
+        let Some((open, _)) = &self.scene else { return };
+        let gaze = self.gaze_direction.unwrap_or(Vec3::NEG_Z);
+        let (yaw, pitch) = crate::view::yaw_pitch(gaze);
+        let gaze_deg = [yaw, pitch].map(|angle| f64::from(angle.to_degrees()));
+        let scene = split_panel::Scene { name: &open.name, adapter: &self.adapter, folder: Path::new("") };
+        let actions = self.split.keys(ctx, Instant::now(), (state.readout.samples, gaze_deg), &scene);
+        actions.into_iter().for_each(|action| self.act(Action::Split(action)));
     }
 
     fn show_editor(&mut self, ctx: &Context) {
@@ -277,6 +295,12 @@ impl Window {
             Action::SavePng => self.engine.request(Request::SavePng(self.free_name("png"))),
             Action::SaveExr => self.engine.request(Request::SaveExr(self.free_name("exr"))),
             Action::Camera(index) => self.jump(index),
+            Action::Split(split_panel::Action::Show(mode)) => {
+                self.controls.mode = mode;
+                self.controls.paused = false;
+                self.engine.request(Request::Restart);
+            }
+            Action::Split(split_panel::Action::Tell(text, wrong)) => self.note = Some(Message::now(text, wrong)),
         }
     }
 
@@ -296,6 +320,13 @@ impl Window {
 
     fn keys(&mut self, ctx: &Context) {
         if ctx.egui_wants_keyboard_input() {
+            return;
+        }
+        // Nothing else may change what somebody is timed on.
+        if self.split.is_running() {
+            if ctx.input_mut(|input| input.consume_key(Modifiers::NONE, Key::Escape)) {
+                self.split.stop();
+            }
             return;
         }
         const NUMBERS: [Key; 9] =
@@ -393,6 +424,7 @@ impl eframe::App for Window {
         let rect = ui.max_rect();
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
         self.follow_loader(&ctx, rect);
+        self.split_keys(&ctx, &state);
         self.keys(&ctx);
         if let (Some((_, navigation)), Some(editor)) = (&mut self.scene, &mut self.editor) {
             let attention = &mut self.controls.attention;

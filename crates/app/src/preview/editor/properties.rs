@@ -32,7 +32,8 @@ pub fn show(ui: &mut Ui, document: &Document, part: Part, state: &mut PanelState
     }
 }
 
-fn title(document: &Document, part: Part) -> String {
+/// What a part is called.
+pub fn title(document: &Document, part: Part) -> String {
     let version = document.version();
     match part {
         Part::Node(node) => node_name(document, node),
