@@ -4,7 +4,7 @@ use anyhow::Context;
 use image::codecs::jpeg::JpegEncoder;
 
 /// Noise of unfinished pictures compresses badly; above this, files double for nothing to see.
-const QUALITY: u8 = 82;
+const QUALITY: u8 = 70;
 
 fn main() -> anyhow::Result<()> {
     let mut arguments = std::env::args_os().skip(1);

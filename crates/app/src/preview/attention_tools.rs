@@ -100,7 +100,10 @@ pub fn point(response: &Response, standpoint: &Standpoint, tools: ToolState, att
         Tool::None => {}
         Tool::Region if response.drag_started_by(PointerButton::Primary) => {
             let view = TracerView { world_from_view: view.film_from_view(), half_extent: view.tan_half };
-            attention.region = Some(Rectangle { view, corners: [at, at] });
+            // The drag is noticed some way from where the button went down.
+            let origin = response.ctx.input(|input| input.pointer.press_origin());
+            let start = origin.map_or(at, |origin| point_in_view(response.rect, origin));
+            attention.region = Some(Rectangle { view, corners: [start, at] });
         }
         Tool::Region if dragged => {
             if let Some(region) = &mut attention.region {
