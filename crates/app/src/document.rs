@@ -84,9 +84,11 @@ pub struct Document {
 impl Document {
     /// A file's scene without edits.
     pub fn new(loaded: &Loaded) -> Self {
-        let (file, nodes) = (Arc::clone(&loaded.scene), loaded.nodes.clone());
+        let file = Arc::clone(&loaded.scene);
+        let tree = Tree::new(&loaded.nodes, &file);
+        let nodes = tree::with_pivots(&loaded.nodes, &tree, &file);
         Self {
-            tree: Tree::new(&nodes, &file),
+            tree,
             names: Names::of(&file, &nodes),
             version: Arc::clone(&file),
             file,
@@ -111,7 +113,8 @@ impl Document {
         &self.file
     }
 
-    /// The file's nodes.
+    /// The file's nodes. The origin of each is the point about which it turns and is scaled: its own, or the middle of what
+    /// hangs on it where its own lies outside of that, as in files whose objects have no places of their own.
     pub fn nodes(&self) -> &[SceneNode] {
         &self.nodes
     }
@@ -161,11 +164,12 @@ impl Document {
     pub fn edit(&mut self, edit: &Edit, gesture: Gesture) {
         let mut edits = self.edits.clone();
         edits.make(edit);
-        let goes_on = self.gesture == Some(edit.target());
-        self.gesture = (gesture == Gesture::GoesOn).then_some(edit.target());
+        // A gesture begins with its first change, not with a pointer that has not moved yet.
         if edits == self.edits {
             return;
         }
+        let goes_on = self.gesture == Some(edit.target());
+        self.gesture = (gesture == Gesture::GoesOn).then_some(edit.target());
         let before = std::mem::replace(&mut self.edits, edits);
         if !goes_on {
             if self.undo.len() == MOST_STEPS {
@@ -245,8 +249,8 @@ impl Document {
         }
         self.solo = self.solo.and_then(|node| places.node(node));
         self.file = Arc::new((*loaded.scene).clone().sharing_parts_of(&self.file));
-        self.nodes.clone_from(&loaded.nodes);
-        self.tree = Tree::new(&self.nodes, &self.file);
+        self.tree = Tree::new(&loaded.nodes, &self.file);
+        self.nodes = tree::with_pivots(&loaded.nodes, &self.tree, &self.file);
         self.names = names;
         self.end_gesture();
         self.remake();

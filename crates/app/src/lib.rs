@@ -5,12 +5,15 @@
 //!
 //! Angles are radians unless a name ends in `_deg`; degrees appear at the command line and on screen only.
 
+pub mod attention;
 pub mod cli;
 pub mod commands;
+pub mod convergence;
 pub mod document;
 pub mod film;
 pub mod gaze;
 pub mod output;
+pub mod pick;
 pub mod preview;
 pub mod readback;
 pub mod reload;
@@ -18,6 +21,7 @@ pub mod sampling;
 pub mod screen;
 pub mod session;
 pub mod settings;
+pub mod split_times;
 pub mod tev;
 pub mod view;
 #[cfg(any(target_os = "linux", target_os = "windows"))]

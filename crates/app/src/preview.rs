@@ -22,7 +22,9 @@ use gaze_control::GazeControl;
 use screenshot::{Outcome, Screenshot};
 use window::Window;
 
+pub mod attention_tools;
 pub mod controls;
+pub mod editor;
 pub mod engine;
 pub mod gaze;
 pub mod gaze_control;
@@ -33,6 +35,7 @@ pub mod open_scene;
 pub mod overlay;
 pub mod pacing;
 pub mod screenshot;
+pub mod split_panel;
 pub mod theme;
 pub mod tracing;
 pub mod window;
@@ -91,7 +94,7 @@ pub fn run(args: &PreviewArgs) -> anyhow::Result<()> {
             Ok(Box::new(Shell { window: shown, lose_at }))
         });
         // Between the frame that does not know of a loss yet and its painting, egui's painter panics.
-        let run = || eframe::run_native("fovea", native_options(args, &source), creator);
+        let run = || eframe::run_native("fovea", native_options(args), creator);
         let outcome = catch_unwind(AssertUnwindSafe(run));
         let is_lost = || window.borrow().as_ref().is_some_and(Window::is_lost);
         let lost = match outcome {
@@ -126,11 +129,12 @@ fn noticed(is_lost: impl Fn() -> bool) -> bool {
     })
 }
 
-fn native_options(args: &PreviewArgs, source: &Source) -> eframe::NativeOptions {
+fn native_options(args: &PreviewArgs) -> eframe::NativeOptions {
     let select = args.scene.adapter.clone().map_or(AdapterSelect::Auto, AdapterSelect::Named);
     eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
-            .with_title(format!("{} - Fovea", source.name()))
+            // The scene's name comes when it is open.
+            .with_title("Fovea")
             .with_app_id("fovea")
             .with_inner_size([args.window.width as f32, args.window.height as f32])
             .with_min_inner_size([320.0, 240.0])

@@ -12,6 +12,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
 
 use notify::{RecursiveMode, Watcher};
+use tracer::scene::EnvironmentImage;
 
 use crate::cli::SceneArgs;
 use crate::session::{self, Loaded, Source, one_line};
@@ -35,6 +36,8 @@ pub enum LoadEvent {
     NotOpened(String),
     /// The files of the open scene cannot be read as they are now: one line. The last version stays.
     Broken(String),
+    /// An environment image that was asked for, or why it cannot be had.
+    Environment(PathBuf, Result<Arc<EnvironmentImage>, String>),
 }
 
 /// What takes time at the moment.
@@ -45,6 +48,9 @@ pub struct Loading {
     /// Since when.
     pub since: Instant,
 }
+
+/// Called whenever there is something new.
+type Wake = Arc<dyn Fn() + Send + Sync>;
 
 enum Note {
     Open(Source),
@@ -67,6 +73,8 @@ struct Finished {
 pub struct Loader {
     notes: Sender<Note>,
     events: Receiver<LoadEvent>,
+    outbox: Sender<LoadEvent>,
+    wake: Wake,
     loading: Arc<Mutex<Option<Loading>>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -76,10 +84,11 @@ impl Loader {
     ///
     /// # Errors
     /// When the system gives no thread.
-    pub fn start(args: SceneArgs, timing: Timing, wake: impl Fn() + Send + 'static) -> std::io::Result<Self> {
+    pub fn start(args: SceneArgs, timing: Timing, wake: impl Fn() + Send + Sync + 'static) -> std::io::Result<Self> {
         let (notes, inbox) = mpsc::channel();
         let (outbox, events) = mpsc::channel();
         let loading = Arc::new(Mutex::new(None));
+        let wake: Wake = Arc::new(wake);
         let stirred = Arc::new(AtomicBool::new(false));
         let watcher = notify::recommended_watcher({
             let (stirred, notes) = (Arc::clone(&stirred), notes.clone());
@@ -97,10 +106,10 @@ impl Loader {
             timing,
             notes: notes.clone(),
             inbox,
-            outbox,
+            outbox: outbox.clone(),
             stirred,
             loading: Arc::clone(&loading),
-            wake: Box::new(wake),
+            wake: Arc::clone(&wake),
             // Without a watcher the files are looked at now and then, as on drives that report nothing.
             watcher: watcher.ok(),
             watched: Vec::new(),
@@ -109,7 +118,7 @@ impl Loader {
             open: None,
         };
         let thread = std::thread::Builder::new().name("loader".into()).spawn(move || worker.run())?;
-        Ok(Self { notes, events, loading, thread: Some(thread) })
+        Ok(Self { notes, events, outbox, wake, loading, thread: Some(thread) })
     }
 
     /// Opens a scene; an earlier wish that is not fulfilled yet is given up.
@@ -120,6 +129,25 @@ impl Loader {
     /// Gives up what is being opened.
     pub fn cancel(&self) {
         self.send(Note::Cancel);
+    }
+
+    /// Reads an environment image in the background.
+    pub fn load_environment(&self, path: PathBuf) {
+        let (outbox, wake) = (self.outbox.clone(), Arc::clone(&self.wake));
+        let spawned = std::thread::Builder::new().name("read environment".into()).spawn({
+            let path = path.clone();
+            move || {
+                let result = tracer::environment::load(&path);
+                let result = result.map(|loaded| Arc::new(loaded.image)).map_err(|error| error.to_string());
+                // The handle is gone: nobody wants the image any more.
+                let _ = outbox.send(LoadEvent::Environment(path, result));
+                wake();
+            }
+        });
+        if let Err(error) = spawned {
+            // The receiver is this handle's own.
+            let _ = self.outbox.send(LoadEvent::Environment(path, Err(error.to_string())));
+        }
     }
 
     /// The next event, if there is one.
@@ -192,7 +220,7 @@ struct Worker {
     /// A note that something happened is on its way.
     stirred: Arc<AtomicBool>,
     loading: Arc<Mutex<Option<Loading>>>,
-    wake: Box<dyn Fn() + Send>,
+    wake: Wake,
     watcher: Option<notify::RecommendedWatcher>,
     watched: Vec<PathBuf>,
     /// Counts readings; only the newest one's result is wanted.

@@ -146,7 +146,9 @@ impl Edits {
             Edit::Move(node, moved) => self.nodes.entry(*node).or_default().moved = *moved,
             Edit::Hide(node, hidden) => self.nodes.entry(*node).or_default().hidden = Some(*hidden),
             Edit::ShowAll => {
-                self.nodes.values_mut().for_each(|edit| edit.hidden = edit.hidden.filter(|hidden| !hidden));
+                for edit in self.nodes.values_mut() {
+                    edit.hidden = edit.hidden.filter(|hidden| !hidden);
+                }
             }
             Edit::Material(material, parameter, value) => {
                 self.materials.entry(*material).or_default().insert(*parameter, *value);

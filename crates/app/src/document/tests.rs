@@ -14,10 +14,10 @@ fn built_in() -> Loaded {
     session::load(&Source::BuiltIn, &args).unwrap()
 }
 
-/// A node that places something and one that hangs on it, made if the file has none.
+/// The vase, hung on a group whose origin is elsewhere.
 fn family() -> (Loaded, u32, u32) {
     let mut loaded = built_in();
-    let child = loaded.scene.instances[0].node;
+    let child = loaded.scene.instances.iter().find(|instance| instance.name == "vase").unwrap().node;
     let parent = loaded.nodes.len() as u32;
     loaded.nodes.push(SceneNode {
         name: "group".into(),
@@ -71,6 +71,18 @@ fn a_slider_is_one_step_and_a_second_pull_another() {
 }
 
 #[test]
+fn a_drag_that_begins_without_a_change_can_be_undone() {
+    let mut document = Document::new(&built_in());
+    let node = document.tree().roots[0];
+    for x in [0.0, 0.1, 0.2] {
+        let moved = Move { translation: Vec3::X * x, ..Move::default() };
+        document.edit(&Edit::Move(node, moved), Gesture::GoesOn);
+    }
+    document.undo();
+    assert!(document.edits().is_empty() && !document.can_undo());
+}
+
+#[test]
 fn only_what_was_edited_is_a_new_part() {
     let mut document = Document::new(&built_in());
     let before = Arc::clone(document.version());
@@ -94,7 +106,7 @@ fn a_node_turns_about_its_origin_and_takes_along_what_hangs_on_it() {
     let before = instance(&document);
     let turn = Move { rotation: Quat::from_rotation_y(0.5), ..Move::default() };
     document.edit(&Edit::Move(parent, turn), Gesture::Once);
-    let pivot = Vec3::new(1.0, 2.0, 3.0);
+    let pivot = Vec3::from(document.nodes()[parent as usize].world_from_node.translation);
     let turned = |point: Vec3| pivot + turn.rotation * (point - pivot);
     for point in [Vec3::ZERO, Vec3::new(0.3, -0.2, 5.0)] {
         let expected = turned(before.transform_point3(point));
@@ -103,12 +115,28 @@ fn a_node_turns_about_its_origin_and_takes_along_what_hangs_on_it() {
     // Its own scale is along its own axes, before the parent's turn.
     let scaled = Move { scale: Vec3::new(2.0, 1.0, 0.5), ..Move::default() };
     document.edit(&Edit::Move(child, scaled), Gesture::Once);
-    let node = loaded.nodes[child as usize].world_from_node;
+    let node = document.nodes()[child as usize].world_from_node;
     let in_node = |point: Vec3| node.inverse().transform_point3(point);
     for point in [Vec3::X, Vec3::new(0.3, -0.2, 5.0)] {
         let expected = turned(node.transform_point3(in_node(before.transform_point3(point)) * scaled.scale));
         assert!(instance(&document).transform_point3(point).distance(expected) < 1e-4);
     }
+}
+
+#[test]
+fn one_takes_hold_of_an_object_where_it_is() {
+    let (mut loaded, parent, child) = family();
+    let document = Document::new(&loaded);
+    let pivot =
+        |document: &Document, node: u32| Vec3::from(document.nodes()[node as usize].world_from_node.translation);
+    // The group has one child, and its own origin lies elsewhere.
+    let alone = |instance: &&tracer::scene::Instance| instance.node != child;
+    assert!(loaded.scene.instances.iter().filter(alone).count() + 1 == loaded.scene.instances.len());
+    assert_eq!(pivot(&document, parent), pivot(&document, child));
+    // An origin inside is kept.
+    let inside = pivot(&document, child) + Vec3::splat(1e-4);
+    loaded.nodes[parent as usize].world_from_node.translation = inside.into();
+    assert!(pivot(&Document::new(&loaded), parent).distance(inside) < 1e-6);
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use glam::Vec3;
 use tracer::import::SceneNode;
 use tracer::scene::Scene;
 
@@ -68,6 +69,40 @@ impl Tree {
         }
         below
     }
+}
+
+/// The nodes with their origins moved to where one takes hold of them: see [`Document::nodes`](super::Document::nodes).
+pub(super) fn with_pivots(nodes: &[SceneNode], tree: &Tree, scene: &Scene) -> Vec<SceneNode> {
+    let boxes: Vec<(Vec3, Vec3)> = scene
+        .meshes
+        .iter()
+        .map(|mesh| mesh.positions.iter().fold((Vec3::MAX, Vec3::MIN), |(low, high), &p| (low.min(p), high.max(p))))
+        .collect();
+    let mut bounds = vec![(Vec3::MAX, Vec3::MIN); nodes.len()];
+    for instance in &scene.instances {
+        let Some(&(low, high)) = boxes.get(instance.mesh as usize).filter(|(low, high)| low.x <= high.x) else {
+            continue;
+        };
+        for corner in 0..8_u32 {
+            let pick = |axis: usize| if corner >> axis & 1 == 0 { low[axis] } else { high[axis] };
+            let point = instance.world_from_mesh.transform_point3(Vec3::new(pick(0), pick(1), pick(2)));
+            for node in tree.line(instance.node) {
+                if let Some((low, high)) = bounds.get_mut(node as usize) {
+                    (*low, *high) = (low.min(point), high.max(point));
+                }
+            }
+        }
+    }
+    let pivoted = nodes.iter().zip(bounds).map(|(node, (low, high))| {
+        let origin = Vec3::from(node.world_from_node.translation);
+        let inside = origin.cmpge(low).all() && origin.cmple(high).all();
+        let mut node = node.clone();
+        if !inside && low.x <= high.x {
+            node.world_from_node.translation = ((low + high) * 0.5).into();
+        }
+        node
+    });
+    pivoted.collect()
 }
 
 /// What a part is called: its name, and which of those that share it.

@@ -2,8 +2,10 @@
 
 use std::time::Duration;
 
+use crate::attention::Attention;
 use crate::cli::PreviewArgs;
 use crate::cli::choices::{Clip, EccentricityAt, Mode, ToneMapping};
+use crate::convergence::Convergence;
 use crate::sampling::Acuity;
 use crate::screen::ScreenGeometry;
 
@@ -38,6 +40,8 @@ pub struct Controls {
     pub shown: Shown,
     /// No tracing while true.
     pub paused: bool,
+    /// Where else samples are wanted.
+    pub attention: Attention,
 }
 
 impl From<&PreviewArgs> for Controls {
@@ -52,6 +56,7 @@ impl From<&PreviewArgs> for Controls {
             tone_map: args.picture.tonemap,
             shown: Shown::Picture,
             paused: false,
+            attention: Attention::default(),
         }
     }
 }
@@ -65,6 +70,8 @@ pub struct Readout {
     pub samples_per_s: f64,
     /// Samples in the film pixel at the gaze, averaged over its neighbourhood.
     pub spp_at_gaze: f32,
+    /// How far the picture at the gaze has come.
+    pub convergence: Convergence,
     /// Time spent tracing since the film started.
     pub elapsed: Duration,
     /// Time spent tracing since the window opened.

@@ -15,6 +15,7 @@ use tracer::film::FilmSnapshot;
 use tracer::gpu::Gpu;
 use tracer::scene::Scene;
 
+use super::attention_tools;
 use super::controls::{Controls, Readout};
 use super::gaze::{Gaze, ScreenMapping};
 use super::keeper::Keeper;
@@ -23,6 +24,7 @@ use super::pacing::Pacing;
 use super::tracing::Tracing;
 use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
+use crate::convergence::{Convergence, Follower};
 use crate::gaze::hub::{GazeHub, SampleTimes};
 use crate::output::{exr, png};
 use crate::readback;
@@ -228,7 +230,8 @@ impl Engine {
             rate: Rate::default(),
             traced: Duration::ZERO,
             read_at: None,
-            spp_at_gaze: 0.0,
+            convergence: Convergence::default(),
+            follower: Follower::default(),
             non_finite_dropped: 0,
             failed: None,
             keeper: Keeper::new(Instant::now()),
@@ -314,7 +317,8 @@ struct Worker {
     traced: Duration,
     /// When the two figures below were last read from the device, which waits for it.
     read_at: Option<Instant>,
-    spp_at_gaze: f32,
+    convergence: Convergence,
+    follower: Follower,
     non_finite_dropped: u64,
     /// What could not be shown; not tried again until the window shows something else.
     failed: Option<Look>,
@@ -371,7 +375,9 @@ impl Worker {
         // The window may have been drawn long ago; the eye has moved since.
         let target = self.gaze.target_for_batch(Instant::now(), &look.standpoint.view);
         self.sample = target.sample;
-        let look = &Look { gaze: Gaze { point: target.point }, ..look.clone() };
+        let gaze = Gaze { point: target.point };
+        let gaze = attention_tools::gaze(&look.controls.attention, &look.standpoint, gaze);
+        let look = &Look { gaze, ..look.clone() };
         let changed = self.tracing.follow(look);
         if prepares {
             self.busy(None);
@@ -436,7 +442,9 @@ impl Worker {
         self.gaze.shown(Instant::now(), self.sample);
         self.shown = Some(Shown { look: look.clone(), samples, coarseness, at: Instant::now() });
         if self.read_at.is_none_or(|at| at.elapsed() >= READ_INTERVAL) {
-            self.spp_at_gaze = self.tracing.samples_at(look.standpoint.view.direction_at(look.gaze.point))?;
+            let direction = look.standpoint.view.direction_at(look.gaze.point);
+            let block = self.tracing.block_at(direction)?;
+            self.convergence = self.follower.update(direction, block, self.tracing.elapsed());
             self.non_finite_dropped = self.tracing.non_finite_dropped()?;
             self.read_at = Some(Instant::now());
         }
@@ -458,7 +466,8 @@ impl Worker {
         Readout {
             samples: self.tracing.samples(),
             samples_per_s: self.rate.per_second(),
-            spp_at_gaze: self.spp_at_gaze,
+            spp_at_gaze: self.convergence.block.samples as f32,
+            convergence: self.convergence,
             elapsed: self.tracing.elapsed(),
             traced: self.traced,
             non_finite_dropped: self.non_finite_dropped,

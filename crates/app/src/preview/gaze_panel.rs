@@ -16,10 +16,10 @@ use crate::gaze::validation::Purpose;
 /// Width of the panel, points.
 const PANEL_WIDTH: f32 = 250.0;
 
-/// Draws the panel at the window's right.
-pub fn panel(ctx: &Context, gaze: &mut GazeControl, now: Instant) {
+/// Draws the panel at the window's right, so many points from where it is otherwise.
+pub fn panel(ctx: &Context, gaze: &mut GazeControl, offset: f32, now: Instant) {
     let report = gaze.report(now);
-    Area::new(Id::unique("gaze")).anchor(Align2::RIGHT_TOP, egui::vec2(-10.0, 10.0)).show(ctx, |ui| {
+    Area::new(Id::unique("gaze")).anchor(Align2::RIGHT_TOP, egui::vec2(-10.0 - offset, 10.0)).show(ctx, |ui| {
         theme::panel().show(ui, |ui| {
             ui.set_width(PANEL_WIDTH);
             ui.label(RichText::new("Gaze").heading());

@@ -1,30 +1,48 @@
 //! What lies over the picture: settings, figures, notes and the list of keys.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use egui::{Align, Align2, Area, ComboBox, Context, DragValue, Grid, Id, Layout, Order, RichText, Slider, Ui};
+use glam::Vec3;
 
+use super::attention_tools::{self, ToolState};
 use super::controls::{Controls, MODES, Readout, Shown, TONE_MAPS, clock, metric};
 use super::engine::HeadsetReadout;
+use super::split_panel::{self, SplitTimes};
 use super::theme;
 use crate::cli::choices::{Clip, EccentricityAt, Mode, Model};
+use crate::convergence::Progress;
 
 /// Width of the panel, points.
 const PANEL_WIDTH: f32 = 236.0;
 
+const OUTLINE_HINT: &str = "Ready: at the gaze, noise is below 20 % of the brightness (95 % confidence)";
+const MATERIAL_HINT: &str = "Ready: at the gaze, noise is below 5 % of the brightness (95 % confidence)";
+
 /// What the keys do, as `?` lists them.
-pub const KEYS: [(&str, &str); 17] = [
-    ("Drag", "look around"),
+pub const KEYS: [(&str, &str); 28] = [
+    ("Drag", "look around; on a handle: move, turn or scale"),
+    ("Click", "select what is there"),
     ("Wheel", "zoom at the pointer"),
     ("W A S D  Q E", "fly; Shift: faster"),
     ("1 - 9", "the file's cameras"),
     ("Home", "back to the camera"),
+    ("N", "scene, properties, materials, lights"),
+    ("T", "handles: move, rotate, scale"),
+    ("Ctrl Z", "undo"),
+    ("Ctrl Shift Z", "redo"),
+    ("Ctrl E", "save the edits beside the scene"),
+    ("Ctrl H", "hide what is selected"),
+    ("Shift H", "show it alone, or all again"),
+    ("Alt H", "show all that is hidden"),
     ("M", "next mode"),
     ("Space", "pause"),
     ("R", "restart"),
     ("F", "ring at the fovea"),
     ("G", "gaze: sources, drift, recording"),
     ("V", "into the headset and out"),
+    ("L", "lock the gaze where it is, or free it"),
+    ("O  P", "split times: the outline, the material is visible"),
     ("X", "sample density"),
     ("[  ]", "exposure"),
     ("Ctrl S", "save the picture as PNG"),
@@ -44,16 +62,18 @@ pub struct Visibility {
     pub ring: bool,
     /// The panel about gaze.
     pub gaze: bool,
+    /// The panel of the scene.
+    pub editor: bool,
 }
 
 impl Default for Visibility {
     fn default() -> Self {
-        Self { panel: true, keys: false, ring: true, gaze: false }
+        Self { panel: true, keys: false, ring: true, gaze: false, editor: false }
     }
 }
 
 /// Something that a button or key asks for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Action {
     /// Start the film again.
     Restart,
@@ -67,6 +87,8 @@ pub enum Action {
     EnterHeadset,
     /// Show it in the window alone.
     LeaveHeadset,
+    /// Go on with split times.
+    Split(split_panel::Action),
 }
 
 /// What the panel shows and cannot change.
@@ -92,10 +114,21 @@ pub struct Facts<'a> {
     pub headset: Option<&'a HeadsetReadout>,
     /// Degrees at the eye of a pixel at the centre.
     pub deg_per_px: f32,
+    /// The direction that one looks in, in the scene.
+    pub gaze: Option<Vec3>,
+    /// What is selected, in words.
+    pub selected: &'a str,
 }
 
 /// Draws the panel.
-pub fn panel(ctx: &Context, facts: &Facts<'_>, controls: &mut Controls, visibility: &mut Visibility) -> Vec<Action> {
+pub fn panel(
+    ctx: &Context,
+    facts: &Facts<'_>,
+    controls: &mut Controls,
+    tools: &mut ToolState,
+    split: &mut SplitTimes,
+    visibility: &mut Visibility,
+) -> Vec<Action> {
     let mut actions = Vec::new();
     Area::new(Id::unique("panel")).anchor(Align2::LEFT_TOP, egui::vec2(10.0, 10.0)).show(ctx, |ui| {
         theme::panel().show(ui, |ui| {
@@ -109,9 +142,16 @@ pub fn panel(ctx: &Context, facts: &Facts<'_>, controls: &mut Controls, visibili
             buttons(ui, controls, &mut actions);
             headset(ui, facts.headset, &mut actions);
             ui.separator();
+            ui.collapsing("Attention", |ui| {
+                attention_tools::panel(ui, tools, &mut controls.attention, facts.gaze);
+            });
+            ui.collapsing("Split times", |ui| {
+                actions.extend(split.show(ui, facts.selected, Instant::now()).map(Action::Split));
+            });
+            ui.collapsing("Pixel at the gaze", |ui| pixel(ui, facts));
             ui.collapsing("Sampling and screen", |ui| sampling(ui, facts, controls, visibility));
             notes(ui, facts.notes);
-            ui.label(RichText::new("?  keys      G  gaze      H  hide").small().weak());
+            ui.label(RichText::new("?  keys     N  scene     G  gaze     H  hide").small().weak());
         });
     });
     actions
@@ -137,6 +177,8 @@ fn figures(ui: &mut Ui, facts: &Facts<'_>, paused: bool) {
     let readout = &facts.readout;
     let rows = [
         ("Samples/s", if paused { "paused".to_owned() } else { metric(readout.samples_per_s) }, "Light paths a second"),
+        ("Outline", progress(readout.convergence.outline), OUTLINE_HINT),
+        ("Material", progress(readout.convergence.material), MATERIAL_HINT),
         ("At the gaze", format!("{} spp", metric(readout.spp_at_gaze.into())), "Samples per film pixel at the gaze"),
         ("In all", metric(readout.samples as f64), "Samples in the film"),
         ("Elapsed", clock(readout.elapsed), "Since the film started"),
@@ -152,6 +194,35 @@ fn figures(ui: &mut Ui, facts: &Facts<'_>, paused: bool) {
         let text = format!("{} samples were not finite", readout.non_finite_dropped);
         ui.label(RichText::new(text).small().color(theme::NOTICE));
     }
+}
+
+/// A threshold's state in a few letters.
+fn progress(progress: Progress) -> String {
+    match progress {
+        Progress::Unknown | Progress::Left(None) => "not yet".into(),
+        Progress::Left(Some(left)) => format!("in {}", clock(left)),
+        Progress::Ready => "ready".into(),
+    }
+}
+
+/// The film's values about the gaze.
+fn pixel(ui: &mut Ui, facts: &Facts<'_>) {
+    let block = &facts.readout.convergence.block;
+    let [red, green, blue] = block.mean;
+    let error = block.standard_error.map_or("-".to_owned(), |error| format!("{error:.3}"));
+    let relative = block.error.map_or("-".to_owned(), |error| format!("{:.1} %", 100.0 * error));
+    Grid::new("pixel").num_columns(2).spacing([8.0, 3.0]).show(ui, |ui| {
+        for (name, value, explanation) in [
+            ("Radiance", format!("{red:.3} {green:.3} {blue:.3}"), "Linear Rec. 709, mean of 7 x 7 film pixels"),
+            ("Samples", format!("{:.1}", block.samples), "Of a film pixel"),
+            ("Standard error", error, "Of a film pixel's luminance"),
+            ("Error, at most", relative, "Relative, with 95 % confidence"),
+        ] {
+            ui.label(RichText::new(name).weak()).on_hover_text(explanation);
+            ui.label(RichText::new(value).monospace());
+            ui.end_row();
+        }
+    });
 }
 
 fn picture(ui: &mut Ui, controls: &mut Controls) {

@@ -58,13 +58,13 @@ impl Screenshot {
     }
 
     /// To be called every frame.
-    pub fn update(&mut self, ctx: &Context, state: &State, trouble: Option<&Message>, gaze: impl FnOnce() -> Value) {
+    pub fn update(&mut self, ctx: &Context, state: &State, trouble: Option<&Message>, more: impl FnOnce() -> Value) {
         ctx.request_repaint_after(LOOK_INTERVAL);
         if let Ok(image) = self.receiver.try_recv() {
             let texels: Vec<[u8; 4]> = image.pixels.iter().map(|pixel| pixel.to_array()).collect();
             let size = image.size.map(|side| side as u32);
             let written = png::write(&self.path, size[0], size[1], &texels);
-            self.leave(ctx, written.map(|()| self.figures(state, &gaze())).map_err(Into::into));
+            self.leave(ctx, written.map(|()| self.figures(state, more())).map_err(Into::into));
             return;
         }
         let failed = state.picture.is_none() && state.busy.is_none();
@@ -105,12 +105,12 @@ impl Screenshot {
         ctx.send_viewport_cmd(ViewportCommand::Close);
     }
 
-    fn figures(&self, state: &State, gaze: &Value) -> Value {
+    fn figures(&self, state: &State, more: Value) -> Value {
         let readout = &state.readout;
         let now = Instant::now();
         let (halfway, traced) = self.halfway.unwrap_or((now, readout.traced));
         let tracing = readout.traced.saturating_sub(traced).as_secs_f64();
-        json!({
+        let mut figures = json!({
             "samples": readout.samples,
             "taken_over": state.taken_over,
             "samples_per_s": readout.samples_per_s,
@@ -122,7 +122,6 @@ impl Screenshot {
             "longest_frame_ms": self.longest_frame.as_secs_f64() * 1e3,
             "film": state.film,
             "mode": state.mode.map(mode_name),
-            "gaze": gaze,
             "headset": state.headset.as_ref().map(|headset| json!({
                 "runtime": headset.runtime,
                 "system": headset.system,
@@ -135,6 +134,10 @@ impl Screenshot {
                 "refreshes": headset.refreshes,
             })),
             "message": state.message.as_ref().map(|message| &message.text),
-        })
+        });
+        if let (Value::Object(figures), Value::Object(more)) = (&mut figures, more) {
+            figures.extend(more);
+        }
+        figures
     }
 }

@@ -16,8 +16,10 @@ use tracer::view::{DebugView, ViewProjection, ViewSettings};
 
 use super::controls::Shown;
 use super::engine::{Look, Picture};
+use crate::attention::Attention;
 use crate::cli::PreviewArgs;
 use crate::cli::choices::{EccentricityAt, Mode};
+use crate::convergence::Block;
 use crate::film::FilmPlan;
 use crate::output::exr::FilmFile;
 use crate::output::png;
@@ -72,6 +74,9 @@ pub struct Tracing {
     generations: u64,
     inverse: Option<(Acuity, Arc<Inverse>)>,
     aim: Option<Aim>,
+    /// What the lists below were made for.
+    attention: Option<(Attention, FilmPlan)>,
+    wanted_pixels: Vec<Arc<[u32]>>,
     view: Option<View>,
     traced: Duration,
     /// The film was taken over: it stays as long as it covers the view, however coarse it is.
@@ -89,6 +94,8 @@ impl Tracing {
             generations: 0,
             inverse: None,
             aim: None,
+            attention: None,
+            wanted_pixels: Vec::new(),
             view: None,
             traced: Duration::ZERO,
             keeps_film: false,
@@ -187,7 +194,7 @@ impl Tracing {
                 self.set_plan(plan, aim, &inverse)?;
             }
         }
-        let moved = self.set_pose_and_aim(standpoint.position, aim, &inverse)?;
+        let moved = self.set_pose_and_aim(look, aim, &inverse)?;
         let turned = self.view != Some(view);
         self.view = Some(view);
         Ok(moved || turned)
@@ -222,16 +229,25 @@ impl Tracing {
     }
 
     /// True when the film starts anew because it is seen from elsewhere.
-    fn set_pose_and_aim(&mut self, position: Vec3, aim: Aim, inverse: &Arc<Inverse>) -> anyhow::Result<bool> {
+    fn set_pose_and_aim(&mut self, look: &Look, aim: Aim, inverse: &Arc<Inverse>) -> anyhow::Result<bool> {
+        let (position, attention) = (look.standpoint.position, &look.controls.attention);
         let Some(Open { renderer: Some(renderer), plan: Some(plan), .. }) = &mut self.open else { return Ok(false) };
+        let plan = *plan;
         let pose = FilmPose { position, world_from_film: plan.world_from_film };
         let moved = renderer.pose() != pose;
         if moved {
             renderer.set_pose(pose);
             self.traced = Duration::ZERO;
         }
-        if self.aim.is_none_or(|last| last.differs(&aim)) || !Arc::ptr_eq(renderer.distribution().inverse(), inverse) {
-            renderer.set_distribution(aim.distribution(&plan.options, plan.world_from_film, inverse))?;
+        let wants = self.attention.as_ref().is_none_or(|(last, of)| last != attention || *of != plan);
+        if wants {
+            self.wanted_pixels = attention.lists(&plan.options, plan.world_from_film);
+            self.attention = Some((attention.clone(), plan));
+        }
+        let aims = self.aim.is_none_or(|last| last.differs(&aim));
+        if wants || aims || !Arc::ptr_eq(renderer.distribution().inverse(), inverse) {
+            let mode = aim.distribution(&plan.options, plan.world_from_film, inverse);
+            renderer.set_distribution(attention.mixed(mode, &self.wanted_pixels))?;
             self.aim = Some(aim);
         }
         Ok(moved)
@@ -273,7 +289,7 @@ impl Tracing {
             self.set_plan(plan, aim, &inverse)?;
             changed = true;
         }
-        Ok(self.set_pose_and_aim(look.standpoint.position, aim, &inverse)? || changed)
+        Ok(self.set_pose_and_aim(look, aim, &inverse)? || changed)
     }
 
     /// Goes on with scene and film on another device. Where the old one does not give its film back, the film is the one
@@ -373,9 +389,9 @@ impl Tracing {
         Ok(self.renderer()?.statistics()?.non_finite.into())
     }
 
-    /// Mean samples of the film pixels about a direction.
-    pub fn samples_at(&mut self, direction: Vec3) -> anyhow::Result<f32> {
-        Ok(self.renderer()?.samples_near(direction, READOUT_RADIUS_PX)?)
+    /// What the film pixels about a direction say.
+    pub fn block_at(&mut self, direction: Vec3) -> anyhow::Result<Block> {
+        Ok(Block::new(&self.renderer()?.pixels_near(direction, READOUT_RADIUS_PX)?))
     }
 
     /// Writes the picture as it is shown.

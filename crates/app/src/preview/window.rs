@@ -1,14 +1,17 @@
 //! The window: the picture, what lies over it, and what mouse and keys do.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use egui::{Color32, Context, Key, Modifiers, Rect, Sense, Ui};
-use glam::{Quat, UVec2, Vec2};
+use glam::{Quat, UVec2, Vec2, Vec3};
 use tracer::film::{FilmHeader, FilmMapping, FilmSnapshot};
+use tracer::scene::Scene;
 
+use super::attention_tools::{self, ToolState};
 use super::controls::{Controls, MODES, Shown};
+use super::editor::{self, Editor};
 use super::engine::{Engine, Look, Message, Request, State, Survivors};
 use super::gaze::{self, Gaze, ScreenMapping, fovea_ring};
 use super::gaze_control::GazeControl;
@@ -17,6 +20,7 @@ use super::navigation::Navigation;
 use super::open_scene::OpenScene;
 use super::overlay::{self, Action, Facts, Visibility};
 use super::screenshot::Screenshot;
+use super::split_panel::{self, SplitTimes};
 use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
 use crate::cli::values::CameraChoice;
@@ -48,6 +52,15 @@ pub struct Window {
     gaze: GazeControl,
     /// The scene that the navigation moves in.
     scene: Option<(OpenScene, Navigation)>,
+    tools: ToolState,
+    split: SplitTimes,
+    /// Where one looks as far as tracing goes, in the scene.
+    gaze_direction: Option<Vec3>,
+    /// What is done with it.
+    editor: Option<Editor>,
+    /// The version that the engine has been given, and the environment image that the loader has been asked for.
+    given: Option<Arc<Scene>>,
+    asked_environment: Option<PathBuf>,
     camera: usize,
     texture: Option<(egui::TextureId, u64)>,
     screenshot: Option<Screenshot>,
@@ -78,6 +91,12 @@ impl Window {
             visibility: Visibility { gaze: gaze.is_worth_showing(), ..Visibility::default() },
             gaze,
             scene: None,
+            tools: ToolState::default(),
+            split: SplitTimes::default(),
+            gaze_direction: None,
+            editor: None,
+            given: None,
+            asked_environment: None,
             camera: 0,
             texture: None,
             screenshot,
@@ -117,40 +136,61 @@ impl Window {
                 LoadEvent::Opened(source, loaded) => {
                     let title = format!("{} - Fovea", source.name());
                     ctx.send_viewport_cmd(egui::ViewportCommand::Title(title));
-                    self.open(&loaded, rect);
+                    self.open(&source, &loaded, rect);
                 }
-                LoadEvent::Changed(loaded) => self.follow_file(loaded, rect),
+                LoadEvent::Changed(loaded) => self.follow_file(&loaded),
                 LoadEvent::NotOpened(text) => self.note = Some(Message::now(text, true)),
                 LoadEvent::Broken(text) => self.broken = Some(text),
+                LoadEvent::Environment(path, result) => {
+                    if let Some(editor) = &mut self.editor {
+                        editor.take_environment(path, result);
+                    }
+                }
             }
         }
     }
 
-    fn open(&mut self, loaded: &Loaded, rect: Rect) {
+    fn open(&mut self, source: &Source, loaded: &Loaded, rect: Rect) {
         let open = OpenScene::new(loaded, self.asked_camera.as_ref());
         let aspect = rect.width() / rect.height().max(1.0);
         (self.note, self.broken) = (None, None);
         if let Some(start) = open.viewpoints.get(open.start) {
             let mut navigation = Navigation::new(start.position, start.rotation, start.vfov, aspect, open.diagonal);
             self.camera = open.start;
-            self.engine.set_scene(Arc::clone(&loaded.scene));
             if let Some(film) = self.resumed.take() {
                 let (rotation, vfov) = looking_at(&film.header, start, aspect);
                 navigation.jump(film.header.pose.position, rotation, vfov);
                 self.engine.request(Request::GoOn(film));
             }
             self.scene = Some((open, navigation));
+            self.editor = Some(Editor::open(source, loaded));
         }
     }
 
-    fn follow_file(&mut self, loaded: Loaded, rect: Rect) {
+    fn follow_file(&mut self, loaded: &Loaded) {
         self.broken = None;
-        let Some((open, navigation)) = &mut self.scene else { return self.open(&loaded, rect) };
-        *open = OpenScene::new(&loaded, self.asked_camera.as_ref());
-        navigation.set_scale(open.diagonal);
-        self.camera = self.camera.min(open.viewpoints.len().saturating_sub(1));
-        self.engine.set_scene(loaded.scene);
-        self.note = Some(Message::now("read again: the file has changed".into(), false));
+        if let (Some((open, navigation)), Some(editor)) = (&mut self.scene, &mut self.editor) {
+            *open = OpenScene::new(loaded, self.asked_camera.as_ref());
+            navigation.set_scale(open.diagonal);
+            self.camera = self.camera.min(open.viewpoints.len().saturating_sub(1));
+            editor.follow_file(loaded);
+        }
+    }
+
+    /// Gives the engine the document's version and asks the loader for what that lacks.
+    fn hand_over(&mut self) {
+        let Some(document) = self.editor.as_ref().map(Editor::document) else { return };
+        if !self.given.as_ref().is_some_and(|given| Arc::ptr_eq(given, document.version())) {
+            self.given = Some(Arc::clone(document.version()));
+            self.engine.set_scene(Arc::clone(document.version()));
+        }
+        let wanted = document.wanted_environment();
+        if wanted != self.asked_environment.as_deref() {
+            self.asked_environment = wanted.map(Path::to_owned);
+            if let Some(path) = wanted {
+                self.loader.load_environment(path.to_owned());
+            }
+        }
     }
 
     /// Puts the engine's texture on the screen.
@@ -188,7 +228,10 @@ impl Window {
     }
 
     fn overlay(&mut self, ctx: &Context, state: &State, deg_per_px: f32) {
-        if let Some((scene, _)) = self.scene.as_ref().filter(|_| self.visibility.panel) {
+        self.split.banner(ctx);
+        let selected = self.editor.as_ref().map(Editor::selected_name).unwrap_or_default();
+        let shown = self.visibility.panel && !self.split.hides_mode();
+        if let Some((scene, _)) = self.scene.as_ref().filter(|_| shown) {
             let cameras: Vec<String> = scene.viewpoints.iter().map(|viewpoint| viewpoint.name.clone()).collect();
             let facts = Facts {
                 scene: &scene.name,
@@ -201,18 +244,44 @@ impl Window {
                 readout: state.readout,
                 headset: state.headset.as_ref(),
                 deg_per_px,
+                gaze: self.gaze_direction,
+                selected: &selected,
             };
-            for action in overlay::panel(ctx, &facts, &mut self.controls, &mut self.visibility) {
+            let (controls, tools, split) = (&mut self.controls, &mut self.tools, &mut self.split);
+            for action in overlay::panel(ctx, &facts, controls, tools, split, &mut self.visibility) {
                 self.act(action);
             }
         }
+        if self.visibility.editor {
+            self.show_editor(ctx);
+        }
         if self.visibility.gaze && !self.gaze.shows_dots() {
-            gaze_panel::panel(ctx, &mut self.gaze, Instant::now());
+            let offset = if self.visibility.editor { editor::panel::PANEL_WIDTH + 30.0 } else { 0.0 };
+            gaze_panel::panel(ctx, &mut self.gaze, offset, Instant::now());
         }
         if self.visibility.keys {
             overlay::keys(ctx);
         }
         self.message(ctx, state);
+    }
+
+    /// What the keys of a run of split times do.
+    fn split_keys(&mut self, ctx: &Context, state: &State) {
+        let Some((open, _)) = &self.scene else { return };
+        let gaze = self.gaze_direction.unwrap_or(Vec3::NEG_Z);
+        let (yaw, pitch) = crate::view::yaw_pitch(gaze);
+        let gaze_deg = [yaw, pitch].map(|angle| f64::from(angle.to_degrees()));
+        let scene = split_panel::Scene { name: &open.name, adapter: &self.adapter, folder: Path::new("") };
+        let actions = self.split.keys(ctx, Instant::now(), (state.readout.samples, gaze_deg), &scene);
+        actions.into_iter().for_each(|action| self.act(Action::Split(action)));
+    }
+
+    fn show_editor(&mut self, ctx: &Context) {
+        let (Some(editor), Some((scene, _))) = (&mut self.editor, &self.scene) else { return };
+        let cameras: Vec<String> = scene.viewpoints.iter().map(|viewpoint| viewpoint.name.clone()).collect();
+        if let Some(camera) = editor.show_panel(ctx, &cameras, self.camera) {
+            self.jump(camera);
+        }
     }
 
     fn message(&self, ctx: &Context, state: &State) {
@@ -245,7 +314,8 @@ impl Window {
             overlay::message(ctx, &note, false, false);
             return;
         }
-        let newest = self.note.iter().chain(&state.message).max_by_key(|message| message.at);
+        let editor = self.editor.as_ref().and_then(Editor::message);
+        let newest = self.note.iter().chain(&state.message).chain(editor).max_by_key(|message| message.at);
         let Some(Message { text, wrong, at }) = newest else { return };
         let stays = if *wrong { COMPLAINT } else { NOTE };
         // Without a scene there is nothing else to see, so the reason stays.
@@ -265,13 +335,19 @@ impl Window {
             Action::Camera(index) => self.jump(index),
             Action::EnterHeadset => self.engine.request(Request::EnterHeadset),
             Action::LeaveHeadset => self.engine.request(Request::LeaveHeadset),
+            Action::Split(split_panel::Action::Show(mode)) => {
+                self.controls.mode = mode;
+                self.controls.paused = false;
+                self.engine.request(Request::Restart);
+            }
+            Action::Split(split_panel::Action::Tell(text, wrong)) => self.note = Some(Message::now(text, wrong)),
         }
     }
 
     /// A name in the working directory that is not taken.
     fn free_name(&self, extension: &str) -> PathBuf {
         let scene = self.scene.as_ref().map_or("picture", |(scene, _)| scene.name.as_str());
-        free_name(std::path::Path::new(""), scene, extension)
+        free_name(Path::new(""), scene, extension)
     }
 
     fn jump(&mut self, index: usize) {
@@ -286,9 +362,39 @@ impl Window {
         if ctx.egui_wants_keyboard_input() {
             return;
         }
+        // Nothing else may change what somebody is timed on.
+        if self.split.is_running() {
+            if ctx.input_mut(|input| input.consume_key(Modifiers::NONE, Key::Escape)) {
+                self.split.stop();
+            }
+            return;
+        }
         const NUMBERS: [Key; 9] =
             [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7, Key::Num8, Key::Num9];
         let pressed = |modifiers, key| ctx.input_mut(|input| input.consume_key(modifiers, key));
+        if let Some(editor) = &mut self.editor {
+            // Several may come in one frame where frames are long.
+            let count = |modifiers, key| ctx.input_mut(|input| input.count_and_consume_key(modifiers, key));
+            let redo = count(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z) + count(Modifiers::COMMAND, Key::Y);
+            let undo = count(Modifiers::COMMAND, Key::Z);
+            (0..undo).for_each(|_| editor.act(editor::panel::Action::Undo));
+            (0..redo).for_each(|_| editor.act(editor::panel::Action::Redo));
+            if pressed(Modifiers::COMMAND, Key::E) {
+                editor.act(editor::panel::Action::Save);
+            }
+            if pressed(Modifiers::COMMAND, Key::H) {
+                editor.hide_selected();
+            }
+            if pressed(Modifiers::SHIFT, Key::H) {
+                editor.toggle_solo();
+            }
+            if pressed(Modifiers::ALT, Key::H) {
+                editor.show_all();
+            }
+            if pressed(Modifiers::NONE, Key::T) {
+                editor.panel.gizmo = editor.panel.gizmo.next();
+            }
+        }
         let exr = pressed(Modifiers::COMMAND | Modifiers::SHIFT, Key::S);
         let png = pressed(Modifiers::COMMAND, Key::S);
         let plain = |key| pressed(Modifiers::NONE, key);
@@ -319,6 +425,13 @@ impl Window {
         if plain(Key::G) {
             self.visibility.gaze = !self.visibility.gaze;
         }
+        if plain(Key::L) {
+            let locked = &mut self.controls.attention.locked_gaze;
+            *locked = if locked.is_some() { None } else { self.gaze_direction };
+        }
+        if plain(Key::N) {
+            self.visibility.editor = !self.visibility.editor;
+        }
         if plain(Key::H) {
             self.visibility.panel = !self.visibility.panel;
         }
@@ -326,8 +439,12 @@ impl Window {
             self.visibility.keys = !self.visibility.keys;
         }
         if pressed(Modifiers::NONE, Key::Escape) {
+            let open = self.visibility.keys || self.gaze.shows_dots();
             self.visibility.keys = false;
             self.gaze.stop_dots();
+            if let Some(editor) = self.editor.as_mut().filter(|_| !open) {
+                editor.act(editor::panel::Action::Select(None));
+            }
         }
         let actions = [(exr, Action::SaveExr), (png, Action::SavePng), (restart, Action::Restart)];
         actions.into_iter().filter(|(asked, _)| *asked).for_each(|(_, action)| self.act(action));
@@ -344,10 +461,13 @@ impl Window {
         }
     }
 
-    fn open_dropped_file(&self, ctx: &Context) {
+    fn open_dropped_file(&mut self, ctx: &Context) {
         let dropped = ctx.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_owned()));
-        if let Some(path) = dropped {
-            self.loader.open(Source::File(path));
+        let Some(path) = dropped else { return };
+        let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+        match (&mut self.editor, extension.as_deref()) {
+            (Some(editor), Some("hdr" | "exr")) => editor.set_environment(path),
+            _ => self.loader.open(Source::File(path)),
         }
     }
 }
@@ -362,10 +482,18 @@ impl eframe::App for Window {
         let rect = ui.max_rect();
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
         self.follow_loader(&ctx, rect);
+        self.split_keys(&ctx, &state);
         self.keys(&ctx, state.headset.is_some());
         self.follow_presses(&state);
-        if let Some((_, navigation)) = &mut self.scene {
-            navigation.update(ui, &response);
+        if let (Some((_, navigation)), Some(editor)) = (&mut self.scene, &mut self.editor) {
+            let attention = &mut self.controls.attention;
+            let used = attention_tools::point(&response, &navigation.standpoint, self.tools, attention);
+            if !used {
+                editor.point(ui, &response, &navigation.standpoint);
+            }
+            if !used && !editor.holds_pointer() {
+                navigation.update(ui, &response);
+            }
         }
         let now = Instant::now();
         let view = self.scene.as_ref().map(|(_, navigation)| navigation.standpoint.view);
@@ -381,11 +509,21 @@ impl eframe::App for Window {
         let mut deg_per_px = 0.0;
         let pointer = gaze::pointer(&response).map(|[x, y]| Vec2::new(x as f32, y as f32));
         let gaze = Gaze { point: target.map(|target| target.point).unwrap_or_default() };
+        let attention = &self.controls.attention;
+        let gaze = match &self.scene {
+            Some((_, navigation)) => attention_tools::gaze(attention, &navigation.standpoint, gaze),
+            None => gaze,
+        };
         if let Some((look, pixel)) = self.look(&ctx, rect, gaze, pointer) {
             deg_per_px = pixel;
+            self.gaze_direction = Some(look.standpoint.view.direction_at(gaze.point));
+            attention_tools::draw(ui.painter(), rect, &look.standpoint, &self.controls.attention);
             // A headset's mirror has its own.
             if self.visibility.ring && self.controls.mode == Mode::Fv && state.headset.is_none() {
                 ui.painter().extend(fovea_ring(&look.mapping, rect, gaze));
+            }
+            if let Some(editor) = self.editor.as_mut().filter(|_| !self.gaze.shows_dots()) {
+                editor.draw(ui, rect, &look.standpoint);
             }
             self.engine.look(look);
         }
@@ -396,11 +534,18 @@ impl eframe::App for Window {
         if !self.gaze.shows_dots() {
             self.overlay(&ctx, &state, deg_per_px);
         }
+        self.hand_over();
         self.gaze.remember_screen(&self.controls, now);
         self.open_dropped_file(&ctx);
         if let Some(screenshot) = &mut self.screenshot {
             let trouble = self.note.as_ref().filter(|note| note.wrong && self.loader.loading().is_none());
-            screenshot.update(&ctx, &state, trouble, || self.gaze.figures(now));
+            let editor = self.editor.as_ref();
+            screenshot.update(
+                &ctx,
+                &state,
+                trouble,
+                || serde_json::json!({ "gaze": self.gaze.figures(now), "editor": editor.map(Editor::figures), "broken": self.broken }),
+            );
         }
     }
 

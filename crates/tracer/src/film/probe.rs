@@ -5,9 +5,6 @@ use glam::Vec3;
 use super::{Film, FilmMapping, FilmOptions, ReadError, read_ranges};
 use crate::{gpu::Gpu, kernels::FILM_WORDS};
 
-/// Word of a film pixel that counts its samples.
-const SAMPLES_WORD: usize = 6;
-
 impl FilmOptions {
     /// The pixel (across, down) that a direction of the film's frame falls on; `None` where the film does not reach.
     pub fn pixel_of(&self, direction: Vec3) -> Option<[u32; 2]> {
@@ -32,8 +29,8 @@ impl FilmOptions {
 }
 
 impl Film {
-    /// Mean number of samples of the pixels at most `radius` columns and rows away; waits for the device.
-    pub fn samples_near(&self, gpu: &Gpu, pixel: [u32; 2], radius: u32) -> Result<f32, ReadError> {
+    /// The words of the pixels at most `radius` columns and rows away; waits for the device.
+    pub fn words_near(&self, gpu: &Gpu, pixel: [u32; 2], radius: u32) -> Result<Vec<u32>, ReadError> {
         let [first_x, first_y] = pixel.map(|p| p.saturating_sub(radius));
         let last_x = (pixel[0] + radius).min(self.options.width - 1);
         let last_y = (pixel[1] + radius).min(self.options.height - 1);
@@ -43,10 +40,7 @@ impl Film {
             let slab = self.slabs.iter().find(|s| (s.first_pixel..s.first_pixel + s.pixel_count).contains(&first))?;
             Some((&slab.buffer, u64::from(first - slab.first_pixel) * u64::from(FILM_WORDS) * 4, row_bytes))
         });
-        let words: Vec<u32> = read_ranges(gpu, &ranges.collect::<Vec<_>>())?;
-        let counts = words.chunks_exact(FILM_WORDS as usize).map(|pixel| f64::from(pixel[SAMPLES_WORD]));
-        let pixels = counts.len().max(1) as f64;
-        Ok((counts.sum::<f64>() / pixels) as f32)
+        read_ranges(gpu, &ranges.collect::<Vec<_>>())
     }
 }
 

@@ -180,27 +180,40 @@ impl FilmSnapshot {
     /// The estimate of pixel `index` (row by row), which must be below the film's number of pixels.
     pub fn pixel(&self, index: usize) -> FilmPixel {
         let words = &self.words[index * FILM_WORDS as usize..][..FILM_WORDS as usize];
-        let samples = words[6];
-        if samples == 0 {
-            return FilmPixel::default();
-        }
-        let n = f64::from(samples);
-        let sum = |i: usize| (u64::from(words[i]) | u64::from(words[i + 1]) << 32) as f64 / self.header.radiance_scale;
-        let sums = [sum(0), sum(2), sum(4)];
-        let mean = sums.map(|s| s / n);
-        let mut variance_of_mean = 0.0;
-        if samples > 1 {
-            let squares = u128::from(words[7]) | u128::from(words[8]) << 32 | u128::from(words[9]) << 64;
-            let squares = squares as f64 / (self.header.luminance_scale * self.header.luminance_scale);
-            let luminance = 0.2126 * sums[0] + 0.7152 * sums[1] + 0.0722 * sums[2];
-            variance_of_mean = ((squares - luminance * luminance / n) / (n - 1.0)).max(0.0) / n;
-        }
-        FilmPixel { mean, samples, variance_of_mean }
+        FilmPixel::from_words(words, self.header.radiance_scale, self.header.luminance_scale)
     }
 
     /// All estimates, row by row.
     pub fn pixels(&self) -> impl Iterator<Item = FilmPixel> + '_ {
         (0..self.header.options.pixels() as usize).map(|index| self.pixel(index))
+    }
+}
+
+impl FilmPixel {
+    /// From a pixel's ten words and the quanta per unit of radiance and of luminance.
+    pub(crate) fn from_words(words: &[u32], radiance_scale: f64, luminance_scale: f64) -> Self {
+        let samples = words[6];
+        if samples == 0 {
+            return Self::default();
+        }
+        let n = f64::from(samples);
+        let sum = |i: usize| (u64::from(words[i]) | u64::from(words[i + 1]) << 32) as f64 / radiance_scale;
+        let sums = [sum(0), sum(2), sum(4)];
+        let mean = sums.map(|s| s / n);
+        let mut variance_of_mean = 0.0;
+        if samples > 1 {
+            let squares = u128::from(words[7]) | u128::from(words[8]) << 32 | u128::from(words[9]) << 64;
+            let squares = squares as f64 / (luminance_scale * luminance_scale);
+            let luminance = 0.2126 * sums[0] + 0.7152 * sums[1] + 0.0722 * sums[2];
+            variance_of_mean = ((squares - luminance * luminance / n) / (n - 1.0)).max(0.0) / n;
+        }
+        Self { mean, samples, variance_of_mean }
+    }
+
+    /// Luminance of the mean, by Rec. 709.
+    #[must_use]
+    pub fn luminance(&self) -> f64 {
+        0.2126 * self.mean[0] + 0.7152 * self.mean[1] + 0.0722 * self.mean[2]
     }
 }
 

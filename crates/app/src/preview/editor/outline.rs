@@ -89,7 +89,8 @@ impl Silhouette {
         for y in low.y as usize..(high.y.ceil() as usize).min(height) {
             for x in low.x as usize..(high.x.ceil() as usize).min(width) {
                 let centre = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-                let inside = [(a, b), (b, c), (c, a)].iter().all(|(p, q)| (*q - *p).perp_dot(centre - *p) * sign >= 0.0);
+                let inside =
+                    [(a, b), (b, c), (c, a)].iter().all(|(p, q)| (*q - *p).perp_dot(centre - *p) * sign >= 0.0);
                 if inside {
                     self.covered[y * width + x] = true;
                 }
@@ -179,8 +180,7 @@ fn box_triangles(mesh: &Mesh) -> [[Vec3; 3]; 12] {
             if index & 4 > 0 { high.z } else { low.z },
         )
     };
-    const FACES: [[usize; 4]; 6] =
-        [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
+    const FACES: [[usize; 4]; 6] = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]];
     let mut triangles = [[Vec3::ZERO; 3]; 12];
     for (face, [a, b, c, d]) in FACES.into_iter().enumerate() {
         triangles[2 * face] = [corner(a), corner(b), corner(c)];
@@ -195,7 +195,8 @@ mod tests {
 
     fn square(low: usize, high: usize) -> Silhouette {
         let mut silhouette = Silhouette { size: [16, 16], covered: vec![false; 256] };
-        let at = |x: usize, y: usize| Vec2::new(x as f32, y as f32);
+        // Just short of the next cell, which a corner would cover.
+        let at = |x: usize, y: usize| Vec2::new(x as f32, y as f32).min(Vec2::splat(high as f32 - 0.01));
         silhouette.fill([at(low, low), at(high, low), at(high, high)]);
         silhouette.fill([at(low, low), at(high, high), at(low, high)]);
         silhouette

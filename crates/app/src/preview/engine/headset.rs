@@ -225,7 +225,8 @@ impl Worker {
         let run = self.headset.as_mut().context("no headset")?;
         run.say(now);
         let (readout, gaze) = (run.readout.clone(), run.gaze().0);
-        self.spp_at_gaze = self.tracing.samples_at(gaze)?;
+        let block = self.tracing.block_at(gaze)?;
+        self.convergence = self.follower.update(gaze, block, self.tracing.elapsed());
         let figures = self.readout();
         let film = self.film_words();
         let mut state = lock(&self.shared.state);

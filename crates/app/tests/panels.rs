@@ -1,0 +1,346 @@
+//! The panels without a window or graphics device: what they show, what they ask for, and that every control has a name
+//! and can be reached by the keyboard.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use clap::Parser;
+use egui::accesskit::Role;
+use egui_kittest::Harness;
+use egui_kittest::kittest::{NodeT, Queryable};
+use fovea_app::cli::{Cli, PreviewArgs};
+use fovea_app::document::edits::{Edit, Part};
+use fovea_app::document::parameters::{MaterialParameter, Value};
+use fovea_app::document::{Document, Gesture};
+use fovea_app::gaze::hub::GazeHub;
+use fovea_app::preview::attention_tools::{Tool, ToolState};
+use fovea_app::preview::controls::Controls;
+use fovea_app::preview::editor::panel::{self, Action, PanelState, Tab};
+use fovea_app::preview::gaze_control::GazeControl;
+use fovea_app::preview::overlay::{self, Facts, Visibility};
+use fovea_app::preview::split_panel::{self, SplitTimes};
+use fovea_app::preview::{gaze_panel, theme};
+use fovea_app::session::{self, Source};
+
+fn args() -> PreviewArgs {
+    Cli::parse_from(["fovea"]).preview
+}
+
+fn built_in() -> Document {
+    Document::new(&session::load(&Source::BuiltIn, &args().scene).unwrap())
+}
+
+/// A window of the usual size.
+fn harness<'a, State>(draw: impl FnMut(&mut egui::Ui, &mut State) + 'a, state: State) -> Harness<'a, State> {
+    let mut harness =
+        Harness::builder().with_size([1280.0, 720.0]).with_context_setup(theme::apply).build_ui_state(draw, state);
+    // Named controls everywhere: `run` panics where one has no name.
+    harness.run_steps(3);
+    harness
+}
+
+/// What can be operated and is enabled, by role and name.
+fn controls<State>(harness: &Harness<'_, State>) -> BTreeSet<String> {
+    let nodes = harness.root().children_recursive().map(|node| node.accesskit_node());
+    let operable = nodes.filter(|node| {
+        egui::accessibility::is_input(node.role())
+            && !node.is_hidden()
+            && !node.is_disabled()
+            && !node.data().is_read_only()
+    });
+    operable.map(|node| format!("{:?} {}", node.role(), node.label().unwrap_or_default())).collect()
+}
+
+/// What the Tab key leads to.
+fn tabbed<State>(harness: &mut Harness<'_, State>) -> BTreeSet<String> {
+    let mut reached = BTreeSet::new();
+    let most = 2 * controls(harness).len() + 40;
+    for _ in 0..most {
+        harness.key_press(egui::Key::Tab);
+        harness.run_steps(1);
+        let nodes = harness.root().children_recursive().map(|node| node.accesskit_node());
+        let focused = nodes.filter(|node| node.is_focused());
+        reached.extend(focused.map(|node| format!("{:?} {}", node.role(), node.label().unwrap_or_default())));
+    }
+    reached
+}
+
+fn assert_reachable<State>(harness: &mut Harness<'_, State>, what: &str) {
+    harness.check_accessibility();
+    let wanted = controls(harness);
+    assert!(!wanted.is_empty(), "{what} has nothing to operate");
+    let reached = tabbed(harness);
+    let missed: Vec<_> = wanted.difference(&reached).collect();
+    assert!(missed.is_empty(), "{what}: the Tab key does not reach {missed:?}");
+}
+
+/// The scene's panel on a document; what is asked for is done to the document and kept.
+struct Scene {
+    document: Document,
+    panel: PanelState,
+    asked: Vec<Action>,
+}
+
+fn scene_harness(document: Document, panel: PanelState) -> Harness<'static, Scene> {
+    let cameras = ["front".to_owned(), "above".to_owned()];
+    let draw = move |ui: &mut egui::Ui, scene: &mut Scene| {
+        let mut actions = Vec::new();
+        panel::panel(ui.ctx(), &scene.document, &cameras, 0, &mut scene.panel, &mut actions);
+        for action in actions {
+            match &action {
+                Action::Edit(edit, gesture) => scene.document.edit(edit, *gesture),
+                Action::Select(part) => scene.panel.selected = *part,
+                Action::Undo => scene.document.undo(),
+                Action::Redo => scene.document.redo(),
+                Action::Solo(node) => scene.document.set_solo(*node),
+                Action::Save | Action::Camera(_) => {}
+            }
+            scene.asked.push(action);
+        }
+    };
+    harness(draw, Scene { document, panel, asked: Vec::new() })
+}
+
+#[test]
+fn every_list_and_every_kind_of_part_can_be_operated_by_keyboard() {
+    let document = built_in();
+    let node = document.version().instances[0].node;
+    let parts = [
+        (Tab::Objects, Part::Node(node)),
+        (Tab::Materials, Part::Material(0)),
+        (Tab::Lights, Part::Environment),
+        (Tab::Cameras, Part::Environment),
+    ];
+    let light = (!document.version().lights.is_empty()).then_some((Tab::Lights, Part::Light(0)));
+    for (tab, part) in parts.into_iter().chain(light) {
+        let state = PanelState { tab, selected: Some(part), search: "a".into(), ..PanelState::default() };
+        let mut harness = scene_harness(document.clone(), state);
+        assert_reachable(&mut harness, &format!("{tab:?} with {part:?}"));
+    }
+}
+
+#[test]
+fn an_object_is_found_hidden_shown_and_selected() {
+    let document = built_in();
+    let node = document.version().instances[0].node;
+    let name = panel::node_name(&document, node);
+    let mut harness = scene_harness(document, PanelState { search: name.to_uppercase(), ..PanelState::default() });
+    harness.get_by_role_and_label(Role::CheckBox, &format!("Show {name}")).click();
+    harness.run_steps(2);
+    assert!(!harness.state().document.is_visible(node));
+    harness.get_by_role_and_label(Role::CheckBox, &format!("Show {name}")).click();
+    harness.run_steps(2);
+    assert!(harness.state().document.is_visible(node));
+    harness.get_by_role_and_label(Role::Button, &name).click();
+    harness.run_steps(2);
+    assert_eq!(harness.state().panel.selected, Some(Part::Node(node)));
+    harness.get_by_label("Solo").click();
+    harness.run_steps(2);
+    assert_eq!(harness.state().document.solo(), Some(node));
+    harness.state_mut().panel.search = "no such name".into();
+    harness.run_steps(2);
+    assert!(harness.query_by_label("No name contains that.").is_some());
+}
+
+#[test]
+fn a_typed_location_moves_the_object_and_undo_takes_it_back() {
+    let document = built_in();
+    let node = document.version().instances[0].node;
+    let before = document.version().instances[0].world_from_mesh;
+    let state = PanelState { selected: Some(Part::Node(node)), ..PanelState::default() };
+    let mut harness = scene_harness(document, state);
+    let field = harness.get_by_label("Location X");
+    let x: f64 = field.value().unwrap().trim_end_matches(" m").parse().unwrap();
+    field.set_value_accesskit(x + 1.5);
+    harness.run_steps(2);
+    let moved = harness.state().document.version().instances[0].world_from_mesh;
+    assert!((moved.translation - before.translation - glam::Vec3A::X * 1.5).length() < 1e-3, "{moved:?} {before:?}");
+    harness.get_by_label("Undo").click();
+    harness.run_steps(2);
+    assert_eq!(harness.state().document.version().instances[0].world_from_mesh, before);
+    harness.get_by_label("Redo").click();
+    harness.run_steps(2);
+    assert_eq!(harness.state().document.version().instances[0].world_from_mesh, moved);
+}
+
+#[test]
+fn a_materials_slider_sets_its_parameter() {
+    let state = PanelState { tab: Tab::Materials, selected: Some(Part::Material(0)), ..PanelState::default() };
+    let mut harness = scene_harness(built_in(), state);
+    for (name, parameter) in [("Roughness", MaterialParameter::Roughness), ("Metallic", MaterialParameter::Metallic)] {
+        harness.get_by_role_and_label(Role::Slider, name).set_value_accesskit(0.625);
+        harness.run_steps(2);
+        let material = &harness.state().document.version().materials[0];
+        assert_eq!(parameter.get(material), Value::Number(0.625), "{name}");
+    }
+    assert_eq!(harness.state().document.edits().materials[&0].len(), 2);
+    harness.get_by_label("As in the file").click();
+    harness.run_steps(2);
+    assert!(harness.state().document.edits().is_empty());
+}
+
+#[test]
+fn the_environment_is_turned_lit_and_loaded() {
+    let state = PanelState {
+        tab: Tab::Lights,
+        selected: Some(Part::Environment),
+        environment: " sky.hdr ".into(),
+        ..PanelState::default()
+    };
+    let mut harness = scene_harness(built_in(), state);
+    harness.get_by_label("Load").click();
+    harness.run_steps(2);
+    let wanted = harness.state().document.wanted_environment().map(ToOwned::to_owned);
+    assert_eq!(wanted, Some("sky.hdr".into()));
+    let image =
+        tracer::scene::EnvironmentImage { width: 1, height: 1, pixels: vec![[1.0; 3]], hash: Default::default() };
+    harness.state_mut().document.add_environment("sky.hdr".into(), Arc::new(image));
+    harness.run_steps(2);
+    harness.get_by_role_and_label(Role::Slider, "Rotation").set_value_accesskit(45.0);
+    harness.run_steps(2);
+    harness.get_by_role_and_label(Role::Slider, "Intensity").set_value_accesskit(2.0);
+    harness.run_steps(2);
+    match &harness.state().document.version().environment {
+        tracer::scene::Environment::Image { rotation_deg, intensity, .. } => {
+            assert_eq!((*rotation_deg, *intensity), (45.0, 2.0));
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_camera_is_jumped_to() {
+    let mut harness = scene_harness(built_in(), PanelState { tab: Tab::Cameras, ..PanelState::default() });
+    harness.get_by_label("above").click();
+    harness.run_steps(2);
+    assert_eq!(harness.state().asked, [Action::Camera(1)]);
+}
+
+#[test]
+fn without_changes_there_is_nothing_to_undo_or_save() {
+    let mut harness = scene_harness(built_in(), PanelState::default());
+    for name in ["Undo", "Redo", "Save edits"] {
+        assert!(harness.get_by_label(name).accesskit_node().is_disabled(), "{name}");
+    }
+    harness.state_mut().document.edit(&Edit::Hide(0, true), Gesture::Once);
+    harness.run_steps(2);
+    assert!(!harness.get_by_label("Save edits").accesskit_node().is_disabled());
+    harness.get_by_label("Save edits").click();
+    harness.run_steps(2);
+    assert_eq!(harness.state().asked, [Action::Save]);
+}
+
+#[test]
+fn the_settings_can_be_operated_by_keyboard() {
+    let notes = ["something was not supported".to_owned()];
+    let cameras = ["front".to_owned(), "above".to_owned()];
+    let mut split = SplitTimes::default();
+    let mut tools = ToolState { tool: Tool::Brush, ..ToolState::default() };
+    let state = (Controls::from(&args()), Visibility::default(), Vec::new());
+    let draw = move |ui: &mut egui::Ui, (controls, visibility, asked): &mut (Controls, Visibility, Vec<_>)| {
+        let facts = Facts {
+            scene: "room.glb",
+            contents: "12 k triangles",
+            adapter: "an adapter",
+            film: "4096x2048",
+            cameras: &cameras,
+            notes: &notes,
+            deg_per_px: 0.02,
+            gaze: Some(glam::Vec3::Z),
+            ..Facts::default()
+        };
+        asked.extend(overlay::panel(ui.ctx(), &facts, controls, &mut tools, &mut split, visibility));
+    };
+    let mut harness = harness(draw, state);
+    assert_reachable(&mut harness, "settings");
+    for section in ["Sampling and screen", "Attention", "Split times", "Pixel at the gaze"] {
+        harness.get_by_label(section).click();
+        harness.run_steps(10);
+        assert_reachable(&mut harness, section);
+        if section == "Attention" {
+            harness.get_by_label("Gaze locked").click();
+            harness.get_by_role_and_label(Role::Slider, "Share").set_value_accesskit(80.0);
+            harness.run_steps(2);
+            let attention = &harness.state().0.attention;
+            assert_eq!((attention.locked_gaze, attention.share), (Some(glam::Vec3::Z), 0.8));
+        }
+        harness.get_by_label(section).click();
+        harness.run_steps(10);
+    }
+    harness.get_by_role_and_label(Role::Slider, "Exposure").set_value_accesskit(1.5);
+    harness.get_by_label("Viewport").click();
+    harness.run_steps(2);
+    assert_eq!(harness.state().0.exposure_ev, 1.5);
+    assert_eq!(harness.state().0.mode, fovea_app::cli::choices::Mode::Vp);
+    harness.get_by_label("Restart").click();
+    harness.run_steps(2);
+    assert_eq!(harness.state().2, [overlay::Action::Restart]);
+}
+
+#[test]
+fn the_gaze_panel_can_be_operated_by_keyboard() {
+    let args = args();
+    let hub = Arc::new(GazeHub::new(&args.gaze.sources, args.gaze.accuracy_deg).unwrap());
+    let control = GazeControl::new(hub, &args);
+    let draw = |ui: &mut egui::Ui, gaze: &mut GazeControl| gaze_panel::panel(ui.ctx(), gaze, 0.0, Instant::now());
+    let mut harness = harness(draw, control);
+    assert_reachable(&mut harness, "gaze");
+}
+
+#[test]
+fn notes_say_what_they_are_told() {
+    let draw = |ui: &mut egui::Ui, cancelled: &mut bool| {
+        overlay::keys(ui.ctx());
+        overlay::broken(ui.ctx(), "room.glb: cannot be read");
+        *cancelled |= overlay::loading(ui.ctx(), "room.glb", Duration::from_secs(3), true);
+    };
+    let mut harness = harness(draw, false);
+    assert!(harness.query_by_label("room.glb: cannot be read").is_some());
+    assert!(harness.query_by_label("loading room.glb, 3.0 s").is_some());
+    for (key, does) in overlay::KEYS {
+        assert!(harness.query_all_by_label(key).next().is_some(), "{key}");
+        assert!(harness.query_all_by_label(does).next().is_some(), "{does}");
+    }
+    harness.get_by_label("Cancel").click();
+    harness.run_steps(2);
+    assert!(*harness.state());
+}
+
+#[test]
+fn a_run_of_split_times_goes_through_its_modes_and_writes_its_results() {
+    let folder = std::env::temp_dir().join(format!("fovea-split-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    let place = folder.clone();
+    let mut split = SplitTimes::default();
+    split.plan.repetitions = 1;
+    let modes = split.plan.modes.len();
+    let first = split.start(5, Instant::now());
+    assert!(matches!(first, Some(split_panel::Action::Show(_))) && split.hides_mode());
+    let draw = move |ui: &mut egui::Ui, (split, told): &mut (SplitTimes, Vec<split_panel::Action>)| {
+        let scene = split_panel::Scene { name: "room.glb", adapter: "an adapter", folder: &place };
+        told.extend(split.keys(ui.ctx(), Instant::now(), (1000, [0.0, 0.0]), &scene));
+        split.banner(ui.ctx());
+    };
+    let mut harness = harness(draw, (split, Vec::new()));
+    for _ in 0..modes {
+        assert!(harness.query_by_label("O: the outline is visible").is_some());
+        // Too early for the material.
+        for key in [egui::Key::P, egui::Key::O] {
+            harness.key_press(key);
+            harness.run_steps(2);
+        }
+        assert!(harness.query_by_label("P: the material is visible").is_some());
+        harness.key_press(egui::Key::P);
+        harness.run_steps(2);
+    }
+    let (split, told) = harness.state();
+    assert_eq!(told.len(), modes);
+    assert!(matches!(told.last(), Some(split_panel::Action::Tell(_, false))) && !split.hides_mode(), "{told:?}");
+    let csv = std::fs::read_to_string(folder.join("split-times-1.csv")).unwrap();
+    assert_eq!(csv.lines().filter(|line| line.contains(",room.glb,")).count(), modes);
+    assert!(folder.join("split-times-1.svg").exists());
+    std::fs::remove_dir_all(folder).unwrap();
+}
