@@ -46,7 +46,7 @@ fn look(renderer: &mut Renderer) -> (Vec<u32>, Vec<[f32; 4]>) {
         ring: None,
     };
     readback::draw(renderer, &settings).unwrap();
-    (words, renderer.view_radiance().unwrap())
+    (words, renderer.presented_radiance().unwrap().1)
 }
 
 #[test]

@@ -28,9 +28,16 @@ pub fn write_provenance(args: &StudyArgs, gpu: &Gpu) -> anyhow::Result<()> {
     ] {
         if measured && (part == "rates" || all[part].is_null()) {
             all[part] = here.clone();
+            all[part]["command"] = command().into();
         }
     }
     super::write_text(&args.output.join(PROVENANCE), &format!("{all:#}\n"))
+}
+
+/// The command line, of paths the last part alone.
+fn command() -> String {
+    let name = |word: String| word.rsplit(['/', '\\']).next().unwrap_or_default().to_owned();
+    std::env::args().map(name).collect::<Vec<_>>().join(" ")
 }
 
 fn read_provenance(args: &StudyArgs) -> Value {
