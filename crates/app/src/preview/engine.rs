@@ -37,6 +37,12 @@ mod headset;
 #[path = "engine/no_headset.rs"]
 mod headset;
 
+mod rate;
+mod readout;
+
+use rate::Rate;
+pub use readout::{HeadsetReadout, Message};
+
 /// How long a thread with nothing to trace sleeps between looks at what the window wants.
 const IDLE: Duration = Duration::from_millis(50);
 /// How long after the last movement the picture is drawn in full again.
@@ -47,8 +53,6 @@ const SMOOTH_ENOUGH: Duration = Duration::from_millis(30);
 const COARSE_WHILE_MOVING: u32 = 2;
 /// How often figures are read from the device.
 const READ_INTERVAL: Duration = Duration::from_millis(500);
-/// Over how long a rate is averaged.
-const RATE_WINDOW: Duration = Duration::from_millis(800);
 
 /// What the window shows, as the person has it.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,49 +97,6 @@ pub struct Picture {
     pub texture: wgpu::TextureView,
     /// Changes with the texture.
     pub generation: u64,
-}
-
-/// A note for the person.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Message {
-    /// One line.
-    pub text: String,
-    /// Whether something went wrong.
-    pub wrong: bool,
-    /// When it was written.
-    pub at: Instant,
-}
-
-impl Message {
-    /// A note of this moment.
-    pub fn now(text: String, wrong: bool) -> Self {
-        Self { text, wrong, at: Instant::now() }
-    }
-}
-
-/// A headset in use.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct HeadsetReadout {
-    /// Name and version of the OpenXR runtime.
-    pub runtime: String,
-    /// Name of the headset.
-    pub system: String,
-    /// Whether the runtime says where the eyes look.
-    pub has_eye_tracker: bool,
-    /// What the session is up to.
-    pub words: String,
-    /// What the fovea goes by.
-    pub gaze_from: String,
-    /// Age of the eyes' sample, where it is known.
-    pub gaze_age: Option<Duration>,
-    /// Frames handed to the runtime.
-    pub frames: u64,
-    /// Frames of the headset that went by without a new picture.
-    pub missed: u64,
-    /// How often the panorama that the eyes see was brought up to date.
-    pub refreshes: u64,
-    /// Width of the mirror over its height.
-    pub mirror_aspect: f32,
 }
 
 /// What the thread is up to.
@@ -634,54 +595,3 @@ struct Shown {
 
 /// The window is gone.
 struct Closed;
-
-/// Samples a second over a sliding window.
-#[derive(Debug, Default)]
-struct Rate {
-    history: std::collections::VecDeque<(u64, Instant)>,
-}
-
-impl Rate {
-    fn add(&mut self, samples: u64, now: Instant) {
-        if self.history.back().is_some_and(|(last, _)| samples < *last) {
-            self.history.clear();
-        }
-        self.history.push_back((samples, now));
-        while self.history.len() > 2 && now.duration_since(self.history[1].1) > RATE_WINDOW {
-            self.history.pop_front();
-        }
-    }
-
-    fn per_second(&self) -> f64 {
-        match (self.history.front(), self.history.back()) {
-            (Some((first, start)), Some((last, end))) if end > start => {
-                (last - first) as f64 / end.duration_since(*start).as_secs_f64()
-            }
-            _ => 0.0,
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_rate_follows_the_last_second_and_a_restart() {
-        let start = Instant::now();
-        let at = |ms| start + Duration::from_millis(ms);
-        let mut rate = Rate::default();
-        assert_eq!(rate.per_second(), 0.0);
-        for step in 0..=20 {
-            rate.add(step * 1000, at(step * 100));
-        }
-        assert!((rate.per_second() - 10_000.0).abs() < 1e-6);
-        for step in 1..=20 {
-            rate.add(20_000 + step * 3000, at(2000 + step * 100));
-        }
-        assert!((rate.per_second() - 30_000.0).abs() < 1e-6);
-        rate.add(10, at(5000));
-        rate.add(20, at(6000));
-        assert!((rate.per_second() - 10.0).abs() < 1e-6);
-    }
-}
