@@ -246,7 +246,7 @@ fn an_object_is_picked_moved_undone_and_saved_and_its_file_broken_and_mended() {
     let options = [scene.to_str().unwrap(), "--max-bounces", "1", "--tonemap", "linear"];
     // The red vase, its handle along X, its material's second slider.
     let (vase, handle, moved_to) = ((340, 560), (400, 533), (460, 533));
-    let (shown, figures) = display.session(34, &options, |display| {
+    let (shown, figures) = display.session(45, &options, |display| {
         let click = |(x, y): (u32, u32)| display.xdotool(&format!("mousemove {x} {y} sleep 0.8 click 1 sleep 1.2"));
         // A slider misses a press and release within one frame, and frames are long on a CPU.
         let press = |(x, y): (u32, u32)| {
@@ -266,14 +266,18 @@ fn an_object_is_picked_moved_undone_and_saved_and_its_file_broken_and_mended() {
             display.xdotool(&format!("mousemove {x} {} sleep 0.3", handle.1));
         }
         display.xdotool("mouseup 1 sleep 1.0");
-        click((1080, 513));
-        press((1150, 445));
-        display.xdotool("key ctrl+z sleep 0.8 key ctrl+shift+z sleep 0.8 key ctrl+e");
-        let start = Instant::now();
-        while !sidecar.exists() {
-            assert!(start.elapsed() < Duration::from_secs(10), "nothing is saved");
-            wait(0.2);
+        // On a busy machine a press may fall between two frames; pressing twice changes nothing more.
+        for attempt in 1.. {
+            click((1080, 513));
+            press((1150, 445));
+            display.xdotool("key ctrl+e");
+            wait(2.0);
+            if sidecar.exists() && saved()["materials"].as_array().is_some_and(|materials| materials.len() == 1) {
+                break;
+            }
+            assert!(attempt < 4, "the slider does not set the material");
         }
+        display.xdotool("key ctrl+z sleep 0.8 key ctrl+shift+z sleep 0.8 key ctrl+e sleep 2.0");
         let edits = saved();
         let moved = edits["nodes"][0]["translation_m"][0].as_f64().unwrap_or_default();
         assert_eq!(
