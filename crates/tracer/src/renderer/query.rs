@@ -1,4 +1,4 @@
-//! Rays answered one by one: what lies under the pointer, and the traversal benches.
+//! Rays answered one by one, for tools, tests and the traversal benches.
 
 use glam::Vec3;
 use wgpu::util::DeviceExt;
