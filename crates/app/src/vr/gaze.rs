@@ -100,8 +100,8 @@ impl EyeGaze {
         let time_secs = sample.captured.saturating_duration_since(self.epoch).as_secs_f64();
         let Some(Filtered { point_deg, phase, .. }) = self.filter.update(time_secs, point) else { return };
         let [yaw, pitch] = point_deg.map(|angle| (angle as f32).to_radians());
-        let moves = matches!(phase, Phase::Fixation | Phase::Saccade);
-        // A closed eye has no newer sample.
+        // A closed eye has no newer sample, also in the moments before that counts as a blink.
+        let moves = looked.is_some() && matches!(phase, Phase::Fixation | Phase::Saccade);
         let captured = match &self.live {
             Some(live) if !moves => live.captured,
             _ => sample.captured,
