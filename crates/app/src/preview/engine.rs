@@ -364,9 +364,10 @@ impl Worker {
         let start = Instant::now();
         let samples = self.tracing.samples();
         let moving = self.moved_at.is_some_and(|at| at.elapsed() < SETTLED);
-        if !moving && self.keeper.is_due(start, samples) {
+        let bytes = self.tracing.film_bytes();
+        if !moving && self.keeper.is_due(start, samples, bytes) {
             lock(&self.shared.survivors).film = self.tracing.snapshot()?.map(Arc::new);
-            self.keeper.taken(start, Instant::now(), samples);
+            self.keeper.taken(start, Instant::now(), samples, bytes);
         }
         if let Some(tev) = self.tev.as_mut().filter(|tev| self.shown.is_some() && tev.is_due()) {
             tev.push(|| self.tracing.radiance())?;

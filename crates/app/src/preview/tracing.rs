@@ -162,6 +162,11 @@ impl Tracing {
         Some([plan.options.width, plan.options.height])
     }
 
+    /// Bytes of the film on the device; 0 before there is one.
+    pub fn film_bytes(&self) -> u64 {
+        self.open.as_ref().and_then(|open| open.plan).map_or(0, |plan| plan.options.bytes())
+    }
+
     /// Whether [`Tracing::follow`] will take long: it makes a film and puts the scene on the device.
     pub fn must_prepare(&self, look: &Look) -> bool {
         let plan = self.open.as_ref().and_then(|open| open.plan);
