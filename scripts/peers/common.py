@@ -5,6 +5,7 @@ reference luminance (mean of 3 x 3 pixels) plus the square of a tenth of the fil
 disc of 5.79 degrees about the gaze.
 """
 
+import argparse
 import json
 import math
 import struct
@@ -12,6 +13,21 @@ import struct
 import numpy as np
 
 FOVEA_DEG = 5.79
+
+
+def parser(description, seeds):
+    """The arguments that every comparison has."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("scene")
+    parser.add_argument("out")
+    parser.add_argument("--camera", type=int, default=0)
+    parser.add_argument("--spp", type=int, nargs="+", default=[4, 16])
+    parser.add_argument("--seeds", type=int, default=seeds)
+    parser.add_argument("--reference-spp", type=int, default=512)
+    parser.add_argument("--max-bounces", type=int, default=3)
+    parser.add_argument("--background", type=float, nargs=3, default=[1, 1, 1])
+    parser.add_argument("--size", type=int, nargs=2, default=[512, 256])
+    return parser
 
 
 def glb_json(path):

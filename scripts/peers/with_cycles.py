@@ -20,16 +20,7 @@ import common
 
 
 def parse():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("scene")
-    parser.add_argument("out")
-    parser.add_argument("--camera", type=int, default=0)
-    parser.add_argument("--spp", type=int, nargs="+", default=[4, 16])
-    parser.add_argument("--seeds", type=int, default=4)
-    parser.add_argument("--reference-spp", type=int, default=512)
-    parser.add_argument("--max-bounces", type=int, default=3)
-    parser.add_argument("--background", type=float, nargs=3, default=[1, 1, 1])
-    parser.add_argument("--size", type=int, nargs=2, default=[512, 256])
+    parser = common.parser(__doc__, seeds=4)
     return parser.parse_args()
 
 

@@ -6,7 +6,6 @@ Needs `pyluxcore`, `numpy` and `pillow` from PyPI. LuxCore reads no glTF: geomet
 surfaces matte, so its pictures are compared with its own references only. CPU path tracing, Sobol sampler, no filter, no denoiser.
 """
 
-import argparse
 import io
 import os
 import time
@@ -24,16 +23,7 @@ BRUSH_STRENGTH = 0.95
 
 
 def parse():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("scene")
-    parser.add_argument("out")
-    parser.add_argument("--camera", type=int, default=0)
-    parser.add_argument("--spp", type=int, nargs="+", default=[4, 16])
-    parser.add_argument("--seeds", type=int, default=2)
-    parser.add_argument("--reference-spp", type=int, default=512)
-    parser.add_argument("--max-bounces", type=int, default=3)
-    parser.add_argument("--background", type=float, nargs=3, default=[1, 1, 1])
-    parser.add_argument("--size", type=int, nargs=2, default=[512, 256])
+    parser = common.parser(__doc__, seeds=2)
     parser.add_argument("--picture", help="save a panorama as PNG, to see that all is right")
     return parser.parse_args()
 

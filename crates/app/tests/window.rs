@@ -71,7 +71,7 @@ impl Display {
                 let output = window.wait_with_output().unwrap();
                 panic!("no window: {}", String::from_utf8_lossy(&output.stderr));
             }
-            assert!(start.elapsed() < Duration::from_secs(60), "no window after a minute");
+            assert!(start.elapsed() < Duration::from_secs(120), "no window after two minutes");
             std::thread::sleep(Duration::from_millis(100));
         };
         // There is no window manager to give the window the keyboard.
@@ -254,7 +254,7 @@ fn an_object_is_picked_moved_undone_and_saved_and_its_file_broken_and_mended() {
         };
         let start = Instant::now();
         while display.xdotool("search --name room.glb").is_empty() {
-            assert!(start.elapsed() < Duration::from_secs(20), "the scene does not open");
+            assert!(start.elapsed() < Duration::from_secs(120), "the scene does not open");
             wait(0.2);
         }
         wait(1.5);

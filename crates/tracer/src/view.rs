@@ -236,18 +236,7 @@ impl ViewRenderer {
             0,
             &[(0, upload(base).as_entire_binding()), (1, wgpu::BindingResource::Buffer(finished))],
         );
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some(present.label()),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: target,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::BLACK), store: wgpu::StoreOp::Store },
-            })],
-            ..Default::default()
-        });
-        present.draw(&mut pass, &group);
-        drop(pass);
+        present.cover(encoder, target, &group, None);
         self.last = Some(settings.projection);
         Ok(())
     }

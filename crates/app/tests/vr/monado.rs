@@ -58,7 +58,7 @@ impl Monado {
         while !self.place.join("monado_comp_ipc").exists() {
             let ended = self.service.as_mut().unwrap().try_wait().unwrap();
             assert!(ended.is_none(), "Monado ended: {}", self.log());
-            assert!(start.elapsed() < Duration::from_secs(30), "Monado does not listen: {}", self.log());
+            assert!(start.elapsed() < Duration::from_secs(120), "Monado does not listen: {}", self.log());
             std::thread::sleep(Duration::from_millis(50));
         }
     }

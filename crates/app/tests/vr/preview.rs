@@ -58,7 +58,7 @@ impl Preview {
                 return state;
             }
             let words = state.message.as_ref().map_or("", |message| &message.text);
-            assert!(start.elapsed() < Duration::from_secs(60), "no {what}: {words}; {:?}", state.readout);
+            assert!(start.elapsed() < Duration::from_secs(180), "no {what}: {words}; {:?}", state.readout);
             std::thread::sleep(Duration::from_millis(5));
         }
     }

@@ -3,6 +3,7 @@
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
 
 use image::RgbImage;
 
@@ -119,25 +120,31 @@ fn both_eyes_pictures_are_on_the_headsets_display() {
         return;
     };
     monado.start(Some(&display));
-    let mut session = monado.inner(name).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-    let mut picture = None;
-    let mut said = Vec::new();
-    for line in BufReader::new(session.stderr.take().unwrap()).lines() {
-        let line = line.unwrap();
-        if line.contains("SHOOT") {
-            picture = Some(dumped(&std::fs::read(monado.place().join("Xvfb_screen0")).unwrap()));
+    let mut session = monado.inner(name).stdin(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
+    // It goes on until its standard input ends.
+    let watched = session.stdin.take();
+    let start = Instant::now();
+    let picture = loop {
+        let picture = dumped(&std::fs::read(monado.place().join("Xvfb_screen0")).unwrap());
+        let middle = picture.width() / 2;
+        let (left, right) = (brightness(&picture, 0..middle), brightness(&picture, middle..picture.width()));
+        // One panorama from one point: the same in both.
+        let same = (left.0 - right.0).abs() < 0.1 * left.0;
+        let seen = left.0 > 20.0 && left.1 > 10.0 && right.0 > 20.0 && right.1 > 10.0 && same;
+        if seen {
+            let seconds = start.elapsed().as_secs_f64();
+            eprintln!(
+                "after {seconds:.1} s: left eye: brightness {left:.1?} (mean, deviation), right eye: {right:.1?}"
+            );
+            break picture;
         }
-        said.push(line);
-    }
-    assert!(session.wait().unwrap().success(), "{}", said.join("\n"));
-    let picture = picture.unwrap();
+        assert_eq!(session.try_wait().unwrap(), None, "the session ended");
+        assert!(start.elapsed() < Duration::from_secs(120), "left eye {left:?}, right eye {right:?}: {}", monado.log());
+        std::thread::sleep(Duration::from_millis(200));
+    };
+    drop(watched);
+    assert!(session.wait().unwrap().success());
     if let Some(path) = std::env::var_os("FOVEA_VR_SCREENSHOT") {
         picture.save(path).unwrap();
     }
-    let middle = picture.width() / 2;
-    let (left, right) = (brightness(&picture, 0..middle), brightness(&picture, middle..picture.width()));
-    eprintln!("left eye: brightness {left:.1?} (mean, deviation), right eye: {right:.1?}");
-    // One panorama from one point: the same in both.
-    assert!(left.0 > 20.0 && left.1 > 10.0 && right.0 > 20.0 && right.1 > 10.0, "{left:?} {right:?}");
-    assert!((left.0 - right.0).abs() < 0.1 * left.0, "{left:?} {right:?}");
 }

@@ -162,12 +162,33 @@ impl Pipeline {
         pass.dispatch_workgroups(workgroups[0], workgroups[1], 1);
     }
 
-    /// Draws the covering triangle with this kernel.
+    /// Covers a target with this kernel, in a pass of its own: all of it whatever it holds, or only a `part` (left, top, width,
+    /// height in pixels), and the rest stays.
     ///
     /// # Panics
     /// On a compute kernel, which is a bug in this crate.
-    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, group: &Option<wgpu::BindGroup>) {
+    pub fn cover(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        target: &wgpu::TextureView,
+        group: &Option<wgpu::BindGroup>,
+        part: Option<[u32; 4]>,
+    ) {
         let PipelineKind::Render(pipeline) = &self.kind else { panic!("{} is no render kernel", self.label) };
+        let load = if part.is_some() { wgpu::LoadOp::Load } else { wgpu::LoadOp::Clear(wgpu::Color::BLACK) };
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some(&self.label),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: target,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations { load, store: wgpu::StoreOp::Store },
+            })],
+            ..Default::default()
+        });
+        if let Some([left, top, width, height]) = part {
+            pass.set_scissor_rect(left, top, width, height);
+        }
         pass.set_pipeline(pipeline);
         if let Some(group) = group {
             pass.set_bind_group(0, group, &[]);

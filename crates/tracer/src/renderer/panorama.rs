@@ -120,18 +120,8 @@ impl Renderer {
         let mut all = vec![(0, uniform.as_entire_binding())];
         all.extend(resources.iter().cloned());
         let group = pipeline.bind(&self.gpu.device, 0, &all);
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some(pipeline.label()),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: target,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations { load: wgpu::LoadOp::Load, store: wgpu::StoreOp::Store },
-            })],
-            ..Default::default()
-        });
-        pass.set_scissor_rect(0, rows.first_row, params.size[0], rows.rows);
-        pipeline.draw(&mut pass, &group);
+        let part = [0, rows.first_row, params.size[0], rows.rows];
+        pipeline.cover(encoder, target, &group, Some(part));
     }
 
     fn uniform(&self, contents: &[u8]) -> wgpu::Buffer {
@@ -183,17 +173,7 @@ impl Renderer {
                 (4, wgpu::BindingResource::Sampler(&panorama.sampler)),
             ],
         );
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some(pipeline.label()),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: target,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations { load: wgpu::LoadOp::Clear(wgpu::Color::BLACK), store: wgpu::StoreOp::Store },
-            })],
-            ..Default::default()
-        });
-        pipeline.draw(&mut pass, &group);
+        pipeline.cover(encoder, target, &group, None);
         Ok(())
     }
 }
