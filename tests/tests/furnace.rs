@@ -227,7 +227,7 @@ fn no_lobe_gains_and_compensated_ones_do_not_lose() {
 }
 
 /// Coarse balls of smooth normals: where the mirror direction of the shading normal would go below the surface, it is bent,
-/// and nothing turns black. Rough metal loses what goes below: at most 0.3 at the rim of a ball whose facets turn by 30 degrees.
+/// and nothing turns black. Rough metal loses what goes below: at most 0.3 at the rim of a ball whose facets turn by 30 degrees; 450 samples a pixel know that to 0.022.
 #[test]
 fn coarse_metal_balls_have_no_black_rim() {
     let gpu = device::gpu();
@@ -242,7 +242,7 @@ fn coarse_metal_balls_have_no_black_rim() {
             Renderer::new(&gpu, &options, Distribution::omnidirectional(device::inverse())).expect("a small film");
         renderer.set_scene(&builder.build()).unwrap();
         renderer.set_pose(FilmPose { position: Vec3::new(0.0, 0.0, 3.0), world_from_film: Quat::IDENTITY });
-        let film = device::trace(&mut renderer, 1 << 18).unwrap();
+        let film = device::trace(&mut renderer, 1 << 20).unwrap();
         let darkest = film.pixels().map(|pixel| pixel.mean[0]).fold(f64::INFINITY, f64::min);
         let brightest = film.pixels().map(|pixel| pixel.mean[0]).fold(0.0, f64::max);
         eprintln!("metal ball of roughness {roughness}: {darkest:.4} to {brightest:.4}");

@@ -248,8 +248,8 @@ fn a_density_wrong_by_2_percent_in_one_layer_is_noticed() {
             "path::trace",
             &[
                 (
-                    "path.pixel = choose_pixel(next_random_2(&random), random);",
-                    "let first = next_random_2(&random);\n    path.pixel = choose_pixel(first, random);",
+                    "path.pixel = choose_pixel(first_random_2(&random), random);",
+                    "let first = first_random_2(&random);\n    path.pixel = choose_pixel(first, random);",
                 ),
                 (
                     "path.throughput = vec3f(1.0);",
@@ -273,8 +273,8 @@ fn a_position_drawn_by_the_density_is_noticed() {
             "path::trace",
             &[
                 (
-                    "path.pixel = choose_pixel(next_random_2(&random), random);",
-                    "let first = next_random_2(&random);\n    path.pixel = choose_pixel(first, random);",
+                    "path.pixel = choose_pixel(first_random_2(&random), random);",
+                    "let first = first_random_2(&random);\n    path.pixel = choose_pixel(first, random);",
                 ),
                 (
                     "import package::sampling::distribution::choose_pixel;",

@@ -110,6 +110,30 @@ pub fn sobol_owen(index: u32, dimension: u32, seed: u32) -> u32 {
     owen_scramble(sobol(index, dimension), hash_combine(seed, dimension))
 }
 
+/// Dimensions 0 and 1 of the unscrambled sequence, `sobol(index, 0)` and `sobol(index, 1)`, without the matrix: the first is the
+/// index's bits reversed; the second's matrix is Pascal's triangle modulo 2, a Kronecker power of `[[1, 1], [0, 1]]`.
+#[must_use]
+pub fn sobol_pair(index: u32) -> [u32; 2] {
+    let x = index.reverse_bits();
+    let mut y = x;
+    y ^= (y & 0x5555_5555) << 1;
+    y ^= (y & 0x3333_3333) << 2;
+    y ^= (y & 0x0f0f_0f0f) << 4;
+    y ^= (y & 0x00ff_00ff) << 8;
+    y ^= y << 16;
+    [x, y]
+}
+
+/// Numbers `2 pair` and `2 pair + 1` of the point `index`, fractions of 2^32: [`sobol_pair`] on the index in an order of the pair's
+/// own, scrambled. Each pair is a (0, 2)-sequence in base 2, pairs are independent, and there is no end of them (Burley 2020).
+#[must_use]
+pub fn shuffled_pair(index: u32, pair: u32, seed: u32) -> [u32; 2] {
+    let seed = hash_combine(seed, pair);
+    // A nested permutation of the index keeps every aligned power-of-two run together as a set.
+    let [x, y] = sobol_pair(owen_scramble(index, seed));
+    [owen_scramble(x, hash(seed ^ 0x68bc_21eb)), owen_scramble(y, hash(seed ^ 0x02e5_be93))]
+}
+
 /// Independent points: a hash of `(index, dimension, seed)`, a fraction of 2^32. For statistics and as the baseline.
 #[must_use]
 pub fn independent(index: u32, dimension: u32, seed: u32) -> u32 {

@@ -167,11 +167,8 @@ fn gaze_frame(n: vec3<f32>) -> mat3x3<f32> {
 }
 ";
 
-/// WGSL of [`crate::sequence`]: `hash_u32`, `hash_combine`, `owen_scramble`, `independent_u32`, `to_unit`, `strata_order`.
-///
-/// The Sobol matrix stays with the caller, as a buffer of [`crate::sequence::direction_numbers`]: the value at `index` is
-/// `owen_scramble(x, hash_combine(seed, dimension))`, `x` the exclusive or of `matrix[dimension * 32u + bit]` over the set
-/// bits of `index`, for `dimension < 32`.
+/// WGSL of [`crate::sequence`]: `hash_u32`, `hash_combine`, `owen_scramble`, `sobol_pair`, `shuffled_pair`, `independent_u32`,
+/// `to_unit`, `strata_order`.
 #[must_use]
 pub fn sequence_module() -> String {
     String::from(
@@ -199,6 +196,28 @@ fn owen_scramble(value: u32, seed: u32) -> u32 {
     x = x ^ (x * 0xc7afe638u);
     x = x ^ (x * 0x8d22f6e6u);
     return reverseBits(x);
+}
+
+// Sobol's first two dimensions: reversed bits, and Pascal's triangle modulo 2.
+fn sobol_pair(index: u32) -> vec2<u32> {
+    let x = reverseBits(index);
+    var y = x;
+    y = y ^ ((y & 0x55555555u) << 1u);
+    y = y ^ ((y & 0x33333333u) << 2u);
+    y = y ^ ((y & 0x0f0f0f0fu) << 4u);
+    y = y ^ ((y & 0x00ff00ffu) << 8u);
+    y = y ^ (y << 16u);
+    return vec2<u32>(x, y);
+}
+
+// Two scrambled numbers of a point; pairs are independent of one another.
+fn shuffled_pair(index: u32, pair: u32, seed: u32) -> vec2<u32> {
+    let seed_of_pair = hash_combine(seed, pair);
+    let point = sobol_pair(owen_scramble(index, seed_of_pair));
+    return vec2<u32>(
+        owen_scramble(point.x, hash_u32(seed_of_pair ^ 0x68bc21ebu)),
+        owen_scramble(point.y, hash_u32(seed_of_pair ^ 0x02e5be93u)),
+    );
 }
 
 // Independent numbers: a hash of all three.

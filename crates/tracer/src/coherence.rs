@@ -5,7 +5,7 @@
 //! holds exactly one, and the map from the k low index bits to the cell is linear over GF(2). Its inverse turns a
 //! Morton-ordered cell number, the thread, into an index. Owen scrambling keeps cells together, so it can be ignored.
 
-use crate::kernels::direction_numbers;
+use fovea_sampler::sequence::sobol;
 
 /// Index bits that a batch may permute: batches have at most 2^20 samples.
 pub const ORDER_BITS: usize = 20;
@@ -17,11 +17,10 @@ pub const ORDER_BITS: usize = 20;
 pub fn order_columns(log2_size: u32) -> [u32; ORDER_BITS] {
     let k = log2_size as usize;
     assert!(k <= ORDER_BITS, "batches are at most 2^{ORDER_BITS} samples");
-    let numbers = direction_numbers();
     // Column i: thread bits of the cell that index bit i alone moves to; thread bit k-1 is the first bit of x.
     let cell_of_bit = |i: usize| {
         (0..k).fold(0u32, |cell, bit| {
-            let digit = numbers[(bit % 2) * 32 + i] >> (31 - bit / 2) & 1;
+            let digit = sobol(1 << i, bit as u32 % 2) >> (31 - bit / 2) & 1;
             cell | digit << (k - 1 - bit)
         })
     };
@@ -48,8 +47,6 @@ pub fn order_columns(log2_size: u32) -> [u32; ORDER_BITS] {
 
 #[cfg(test)]
 mod tests {
-    use fovea_sampler::sequence::sobol;
-
     use super::*;
 
     fn index_of_thread(columns: &[u32; ORDER_BITS], thread: u32) -> u32 {

@@ -3,7 +3,7 @@
 //! The density chooses the pixel; the position inside it is drawn afresh and uniform, so every distribution converges
 //! to the same value in every pixel that it gives density to.
 
-use std::sync::Arc;
+use std::{f64::consts::PI, sync::Arc};
 
 use fovea_sampler::Inverse;
 use glam::{Mat3, Quat, Vec2, Vec3};
@@ -169,6 +169,43 @@ impl Distribution {
         &self.inverse
     }
 
+    /// Strata of the unit square, 2^x columns of 2^y, within which the kernels' further numbers are a sequence of their own:
+    /// as many as pixels like the one that gets most samples would be, so that such a pixel's samples come from a few
+    /// strata and are well spread among themselves.
+    pub(crate) fn stratum_bits(&self, film: &FilmOptions) -> [u32; 2] {
+        let sum: f32 = self.layers.iter().map(|(weight, _)| weight).sum();
+        let densest = self.layers.iter().map(|(weight, layer)| {
+            let share = f64::from(weight / sum) * self.largest_share(layer, film);
+            (share, matches!(layer, Layer::Film))
+        });
+        let (share, is_film) = densest.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((1.0, false));
+        let bits = (-share.log2()).round().clamp(2.0, 30.0) as u32;
+        // Of the film as of its sides; of a disc about the gaze a column more or less does not matter.
+        let wider = if is_film { film.width.max(1).ilog2() as i32 - film.height.max(1).ilog2() as i32 } else { 0 };
+        let x = ((bits as i32 + wider + 1) / 2).clamp(1, bits as i32 - 1) as u32;
+        [x, bits - x]
+    }
+
+    /// Share of a layer's samples that falls on the pixel which gets most of them.
+    fn largest_share(&self, layer: &Layer, film: &FilmOptions) -> f64 {
+        let pixels = film.pixels() as f64;
+        let pixel = match film.mapping {
+            FilmMapping::Equirect => 2.0 * PI * PI / pixels,
+            FilmMapping::Perspective { half_extent: [x, y] } => 4.0 * f64::from(x) * f64::from(y) / pixels,
+        };
+        match layer {
+            Layer::Film => 1.0 / pixels,
+            Layer::Sphere => pixel / (4.0 * PI),
+            Layer::ImagePlane(view) => pixel / (4.0 * f64::from(view.half_extent.x) * f64::from(view.half_extent.y)),
+            Layer::Pixels(list) => 1.0 / list.len().max(1) as f64,
+            Layer::Acuity { radius_scale, .. } => {
+                // About the gaze the density is flat.
+                let u = 1e-3;
+                pixel * f64::from(u) / (2.0 * PI * f64::from(self.inverse.eval_versine(u * radius_scale)))
+            }
+        }
+    }
+
     /// The mixture as the kernels consume it: layers, their number, and the pixel list.
     pub(crate) fn encode(&self) -> ([SampleLayer; MAX_LAYERS], u32, Vec<u32>) {
         let sum: f32 = self.layers.iter().map(|(weight, _)| weight).sum();
@@ -258,7 +295,7 @@ pub fn film_direction(film: &FilmOptions, x: u32, y: u32) -> Vec3 {
     match film.mapping {
         FilmMapping::Equirect => {
             let (sin_lon, cos_lon) = (std::f64::consts::TAU * (u - 0.5)).sin_cos();
-            let (sin_lat, cos_lat) = (std::f64::consts::PI * (0.5 - v)).sin_cos();
+            let (sin_lat, cos_lat) = (PI * (0.5 - v)).sin_cos();
             glam::DVec3::new(cos_lat * sin_lon, sin_lat, -cos_lat * cos_lon).as_vec3()
         }
         FilmMapping::Perspective { half_extent } => {

@@ -1,13 +1,8 @@
 //! Kernels: WESL modules composed for a [`KernelKey`] into WGSL, and the pipelines made of them.
 
-use std::{
-    borrow::Cow,
-    collections::BTreeMap,
-    fmt,
-    sync::{Arc, OnceLock},
-};
+use std::{borrow::Cow, collections::BTreeMap, fmt, sync::Arc};
 
-use fovea_sampler::{Inverse, sequence};
+use fovea_sampler::Inverse;
 use thiserror::Error;
 use wesl::{CompileOptions, ModulePath, VirtualResolver, Wesl};
 
@@ -27,9 +22,6 @@ pub const TILE_SIZE: u32 = 8;
 pub const FILM_WORDS: u32 = 10;
 /// Texel pages are squares of this many bits a side.
 pub const TEXEL_PAGE_BITS: u32 = 11;
-/// Dimensions taken from the Sobol sequence: pixel, place in it, and the first bounce's six. Later ones are hashed: the
-/// matrix products of 32 dimensions took a sixth of the time on lavapipe.
-pub const SOBOL_DIMENSIONS: u32 = 10;
 /// Entries of the tables of rough lobes' albedos along the angle.
 pub const ALBEDO_COLUMNS: u32 = 64;
 /// Entries along the roughness.
@@ -312,17 +304,10 @@ fn constants_module(c: &KernelConstants) -> String {
         ("GLASS_SIZE", GLASS_SIZE),
         ("GLASS_LAYERS", GLASS_LAYERS),
         ("FIRST_ROULETTE_BOUNCE", FIRST_ROULETTE_BOUNCE),
-        ("SOBOL_DIMENSIONS", SOBOL_DIMENSIONS),
         ("STACK_SIZE", c.stack_size.max(1)),
         ("ROOT_NODE", c.root_node),
         ("ENVIRONMENT_CELLS_X", c.environment_cells[0].max(1)),
         ("ENVIRONMENT_CELLS_Y", c.environment_cells[1].max(1)),
     ];
     numbers.iter().map(|(name, value)| format!("const {name}: u32 = {value}u;\n")).collect()
-}
-
-/// Sobol direction numbers as the kernels' uniform buffer wants them.
-pub(crate) fn direction_numbers() -> &'static [u32] {
-    static NUMBERS: OnceLock<Vec<u32>> = OnceLock::new();
-    NUMBERS.get_or_init(sequence::direction_numbers)
 }

@@ -93,7 +93,6 @@ pub struct Renderer {
     /// One per slab of the film: they differ in the slab alone.
     params: Vec<wgpu::Buffer>,
     records: wgpu::Buffer,
-    direction_numbers: wgpu::Buffer,
     /// In the film.
     samples: u64,
     first_sample: u64,
@@ -125,10 +124,6 @@ impl Renderer {
             u64::from(LARGEST_BATCH) * size_of::<SampleRecord>() as u64,
             wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
         );
-        let numbers = kernels::direction_numbers();
-        let direction_numbers =
-            buffer("Sobol direction numbers", size_of_val(numbers) as u64, wgpu::BufferUsages::UNIFORM);
-        gpu.queue.write_buffer(&direction_numbers, 0, bytemuck::cast_slice(numbers));
         let sources = Arc::new(ShaderSources::new(distribution.inverse()));
         let mut renderer = Self {
             view: ViewRenderer::new(gpu),
@@ -147,7 +142,6 @@ impl Renderer {
             bound: None,
             params,
             records,
-            direction_numbers,
             samples: 0,
             first_sample: 0,
             next_sample: 0,

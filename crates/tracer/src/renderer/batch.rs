@@ -71,6 +71,8 @@ impl Renderer {
             luminance_scale,
             layer_count,
             use_sobol: u32::from(self.options.sequence == SequenceKind::Sobol),
+            stratum_bits: self.distribution.stratum_bits(&self.options.film),
+            pad_0: [0; 2],
             order,
             layers,
         })
@@ -94,7 +96,7 @@ impl Renderer {
                     &self.gpu.device,
                     &bound.trace,
                     scene,
-                    [&self.params[0], &self.records, &self.pixel_list, &self.direction_numbers],
+                    [&self.params[0], &self.records, &self.pixel_list],
                 );
             }
         }
@@ -108,12 +110,7 @@ impl Renderer {
         let device = &self.gpu.device;
         let trace = self.pipelines.compute(device, &trace_key)?;
         let accumulate = self.pipelines.compute(device, &accumulate_key)?;
-        let trace_groups = trace_groups(
-            device,
-            &trace,
-            scene,
-            [&self.params[0], &self.records, &self.pixel_list, &self.direction_numbers],
-        );
+        let trace_groups = trace_groups(device, &trace, scene, [&self.params[0], &self.records, &self.pixel_list]);
         let accumulate_groups = self
             .film
             .slabs
@@ -176,12 +173,12 @@ pub(super) fn workgroups(samples: u32) -> [u32; 2] {
     [groups.min(1 << 15), groups.div_ceil(1 << 15)]
 }
 
-/// Groups 0 and 1 of a path kernel; `batch` is parameters, records, pixel list, direction numbers.
+/// Groups 0 and 1 of a path kernel; `batch` is parameters, records, pixel list.
 pub(super) fn trace_groups(
     device: &wgpu::Device,
     kernel: &Pipeline,
     scene: &SceneOnGpu,
-    batch: [&wgpu::Buffer; 4],
+    batch: [&wgpu::Buffer; 3],
 ) -> [Option<wgpu::BindGroup>; 2] {
     let first: Vec<_> = (0..).zip(batch.map(wgpu::Buffer::as_entire_binding)).collect();
     [kernel.bind(device, 0, &first), scene_group(device, kernel, scene)]

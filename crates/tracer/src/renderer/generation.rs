@@ -19,7 +19,7 @@ impl Renderer {
         let key = self.key(Kernel::Generate);
         let generate = self.pipelines.compute(&self.gpu.device, &key)?;
         let scene = self.scene.as_ref().ok_or(RenderError::NoScene)?;
-        let batch = [&self.params[0], &self.records, &self.pixel_list, &self.direction_numbers];
+        let batch = [&self.params[0], &self.records, &self.pixel_list];
         let [group, _] = trace_groups(&self.gpu.device, &generate, scene, batch);
         self.timed_pass(generate.label(), |pass| generate.dispatch(pass, &[&group], workgroups(rays)))
     }

@@ -54,6 +54,7 @@ impl Renderer {
             first_index_high: 0,
             seed: 0,
             use_sobol: 1,
+            stratum_bits: everywhere.stratum_bits(&self.options.film),
             max_bounces,
             camera_position: pose.position.to_array(),
             world_from_film: layout::columns(Mat3::from_quat(pose.world_from_film)),
