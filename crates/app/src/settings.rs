@@ -80,6 +80,7 @@ impl From<ToneMapping> for tracer::view::ToneMap {
             ToneMapping::Agx => Self::AgX,
             ToneMapping::PbrNeutral => Self::PbrNeutral,
             ToneMapping::Linear => Self::Linear,
+            ToneMapping::FalseColor => Self::FalseColor,
         }
     }
 }

@@ -123,4 +123,6 @@ pub enum ToneMapping {
     PbrNeutral,
     /// Clipped at 1
     Linear,
+    /// A colour for each stop of luminance about middle grey
+    FalseColor,
 }

@@ -383,6 +383,7 @@ impl Worker {
             || last.standpoint != look.standpoint
             || last.size_px != look.size_px
             || last.controls != look.controls
+            || self.tracing.is_unfinished()
             || shown.samples != self.tracing.samples()
                 && shown.at.elapsed() >= self.pacing.show_interval(self.show_time)
     }
@@ -433,6 +434,7 @@ impl Worker {
             elapsed: self.tracing.elapsed(),
             traced: self.traced,
             non_finite_dropped: self.non_finite_dropped,
+            seen: self.tracing.seen(),
         }
     }
 
