@@ -25,6 +25,7 @@ use window::Window;
 pub mod attention_tools;
 pub mod compare;
 pub mod controls;
+pub mod eccentricity;
 pub mod editor;
 pub mod engine;
 pub mod gaze;

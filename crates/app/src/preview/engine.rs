@@ -347,11 +347,11 @@ impl Worker {
             self.pacing.restart();
             self.moved_at = Some(Instant::now());
         }
-        if !look.controls.paused {
+        if !look.controls.paused && !self.tracing.is_unfinished() {
             let (samples, took) = self.tracing.trace(self.pacing.batch())?;
             self.traced += took;
             self.pacing.measured(samples, took, self.show_time);
-            self.rate.add(self.tracing.samples(), Instant::now());
+            self.rate.add(self.tracing.samples_of_all(), Instant::now());
         }
         if self.is_due(look) {
             self.show(look)?;

@@ -10,6 +10,8 @@ use crate::cli::choices::ToneMapping;
 
 /// Size of a bar of colours, points.
 const BAR: Vec2 = Vec2::new(234.0, 12.0);
+/// Colours of normals along the axes.
+const AXES: [([u8; 3], &str); 3] = [([255, 128, 128], "+X"), ([128, 255, 128], "+Y"), ([128, 128, 255], "+Z")];
 /// Steps in which a ramp is drawn.
 const RAMP_STEPS: u8 = 48;
 
@@ -33,14 +35,12 @@ pub fn draw(ctx: &Context, controls: &Controls, scale: Option<DebugScale>, offse
             match (controls.shown, scale) {
                 (DebugView::Beauty, _) => stops(ui),
                 (DebugView::Stale, _) => swatches(ui, &[(STALE_COLOR, caption)]),
-                (DebugView::Normal, _) => {
-                    swatches(ui, &[([255, 128, 128], "+X"), ([128, 255, 128], "+Y"), ([128, 128, 255], "+Z")])
-                }
+                (DebugView::Normal, _) => swatches(ui, &AXES),
                 (shown, Some(scale)) => bar(ui, scale, |value| words(shown, value)),
                 (_, None) => {}
             }
             if controls.shown != DebugView::Stale {
-                ui.label(RichText::new(caption).small().weak());
+                ui.add(egui::Label::new(RichText::new(caption).small().weak()).extend());
             }
         });
     });

@@ -22,7 +22,7 @@ const OUTLINE_HINT: &str = "Ready: at the gaze, noise is below 20 % of the brigh
 const MATERIAL_HINT: &str = "Ready: at the gaze, noise is below 5 % of the brightness (95 % confidence)";
 
 /// What the keys do, as `?` lists them.
-pub const KEYS: [(&str, &str); 32] = [
+pub const KEYS: [(&str, &str); 33] = [
     ("Drag", "look around; on a handle: move, turn or scale"),
     ("Click", "select what is there"),
     ("Wheel", "zoom at the pointer"),
@@ -41,6 +41,7 @@ pub const KEYS: [(&str, &str); 32] = [
     ("Space", "pause"),
     ("R", "restart"),
     ("F", "ring at the fovea"),
+    ("Shift F", "rings of eccentricity"),
     ("G", "gaze: sources, drift, recording"),
     ("V", "into the headset and out"),
     ("L", "lock the gaze where it is, or free it"),
@@ -66,6 +67,8 @@ pub struct Visibility {
     pub keys: bool,
     /// The ring at the fovea.
     pub ring: bool,
+    /// Rings of equal eccentricity.
+    pub eccentricity: bool,
     /// The panel about gaze.
     pub gaze: bool,
     /// The panel of the scene.
@@ -74,7 +77,7 @@ pub struct Visibility {
 
 impl Default for Visibility {
     fn default() -> Self {
-        Self { panel: true, keys: false, ring: true, gaze: false, editor: false }
+        Self { panel: true, keys: false, ring: true, eccentricity: false, gaze: false, editor: false }
     }
 }
 
@@ -334,6 +337,7 @@ fn sampling(ui: &mut Ui, facts: &Facts<'_>, controls: &mut Controls, visibility:
         controls.eccentricity = if at_eye { EccentricityAt::Eye } else { EccentricityAt::Scene };
     });
     ui.checkbox(&mut visibility.ring, "Ring at the fovea");
+    ui.checkbox(&mut visibility.eccentricity, "Rings of eccentricity").on_hover_text("Shift F: degrees from the gaze");
     Grid::new("screen").num_columns(2).spacing([8.0, 3.0]).show(ui, |ui| {
         let screen = &mut controls.screen;
         for (name, value, range) in [

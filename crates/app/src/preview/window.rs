@@ -12,6 +12,7 @@ use tracer::scene::Scene;
 use super::attention_tools::{self, ToolState};
 use super::compare;
 use super::controls::Controls;
+use super::eccentricity;
 use super::editor::{self, Editor};
 use super::engine::{Engine, Look, Message, Request, State, Survivors};
 use super::gaze::{self, Gaze, ScreenMapping, fovea_ring};
@@ -417,6 +418,9 @@ impl Window {
         if plain(Key::M) {
             self.controls.mode = seeing::next_mode(self.controls.mode);
         }
+        if pressed(Modifiers::SHIFT, Key::F) {
+            self.visibility.eccentricity = !self.visibility.eccentricity;
+        }
         if plain(Key::F) {
             if in_headset {
                 self.engine.request(Request::ToggleMarker);
@@ -528,6 +532,10 @@ impl eframe::App for Window {
             // A headset's mirror has its own.
             if self.visibility.ring && self.controls.mode == Mode::Fv && state.headset.is_none() {
                 ui.painter().extend(fovea_ring(&look.mapping, rect, gaze));
+            }
+            if self.visibility.eccentricity && state.headset.is_none() {
+                let at = self.controls.eccentricity;
+                eccentricity::draw(ui.painter(), &look.mapping, &look.standpoint, rect, gaze, at);
             }
             if let Some(comparison) = self.controls.comparison.as_mut().filter(|_| state.headset.is_none()) {
                 compare::wipe(ui, rect, self.controls.mode, comparison, &state.readout);

@@ -150,6 +150,11 @@ impl Tracing {
         })
     }
 
+    /// Samples in all films that are traced.
+    pub fn samples_of_all(&self) -> u64 {
+        self.samples() + self.beside.as_ref().map_or(0, |side| side.renderer.samples())
+    }
+
     /// The renderer of the other film, while two are compared.
     ///
     /// # Errors

@@ -32,7 +32,7 @@ impl Tracing {
         Seen { beside: self.beside_readout(), ..self.seeing.seen }
     }
 
-    /// Whether the last picture shows less than it could, so that the next one is due.
+    /// Whether the last picture shows less than it could, so that the next one is due before samples are.
     pub fn is_unfinished(&self) -> bool {
         self.seeing.is_unfinished
     }
