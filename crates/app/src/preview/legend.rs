@@ -52,7 +52,7 @@ fn words(shown: DebugView, value: f32) -> String {
         DebugView::Depth => format!("{} m", metric(value.into())),
         DebugView::Error => format!("{} %", metric(f64::from(value) * 100.0)),
         DebugView::SampleDensity if value < 1.0 => format!("1/{:.0}", 1.0 / value),
-        DebugView::SampleDensity | DebugView::TraversalSteps => metric(f64::from(value.round())),
+        DebugView::SampleDensity | DebugView::TraversalSteps => format!("{value:.0}"),
         _ => metric(value.into()),
     }
 }
@@ -126,7 +126,7 @@ mod tests {
             (DebugView::Error, 0.001, "0.10 %"),
             (DebugView::Error, 1.0, "100 %"),
             (DebugView::SampleDensity, 1.0 / 16.0, "1/16"),
-            (DebugView::SampleDensity, 4096.0, "4.10 k"),
+            (DebugView::SampleDensity, 4096.0, "4096"),
             (DebugView::TraversalSteps, 57.4, "57"),
         ] {
             assert_eq!(words(shown, value), text);

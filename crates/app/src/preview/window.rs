@@ -340,14 +340,10 @@ impl Window {
             Action::SavePng => self.engine.request(Request::SavePng(self.free_name("png"))),
             Action::SaveExr => self.engine.request(Request::SaveExr(self.free_name("exr"))),
             Action::Camera(index) => self.jump(index),
-            Action::EnterHeadset => {
-                // Both eyes see one film, and it stays what it is.
-                self.controls.comparison = None;
-                self.engine.request(Request::EnterHeadset);
-            }
+            Action::EnterHeadset => self.engine.request(Request::EnterHeadset),
             Action::LeaveHeadset => self.engine.request(Request::LeaveHeadset),
             Action::Split(split_panel::Action::Show(mode)) => {
-                self.controls.mode = mode;
+                (self.controls.mode, self.controls.comparison) = (mode, None);
                 self.controls.paused = false;
                 self.engine.request(Request::Restart);
             }
@@ -496,6 +492,10 @@ impl eframe::App for Window {
         self.split_keys(&ctx, &state);
         self.keys(&ctx, state.headset.is_some());
         self.follow_presses(&state);
+        if state.headset.is_some() {
+            // Both eyes see one film, and it comes back as it is.
+            self.controls.comparison = None;
+        }
         if let (Some((_, navigation)), Some(editor)) = (&mut self.scene, &mut self.editor) {
             let attention = &mut self.controls.attention;
             let used = attention_tools::point(&response, &navigation.standpoint, self.tools, attention);

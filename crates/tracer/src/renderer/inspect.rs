@@ -27,6 +27,7 @@ impl Renderer {
         let scene = self.scene.as_ref().ok_or(RenderError::NoScene)?;
         let hits = match self.view.hits.take() {
             Some(hits) if hits.of == of => hits,
+            Some(hits) if hits.of.size == of.size => hits.anew(&gpu, of),
             _ => FirstHits::new(&gpu, of),
         };
         let hits = self.view.hits.insert(hits);

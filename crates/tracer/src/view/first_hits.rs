@@ -23,6 +23,9 @@ pub(crate) struct HitsOf {
     pub scene: u64,
 }
 
+/// Of no hits: smallest and largest depth, largest number of steps.
+const NO_ENDS: [u32; 3] = [u32::MAX, 0, 0];
+
 /// Made row by row, from the top.
 #[derive(Debug)]
 pub(crate) struct FirstHits {
@@ -39,7 +42,7 @@ pub(crate) struct FirstHits {
 impl FirstHits {
     /// Room for the hits of a view.
     pub fn new(gpu: &Gpu, of: HitsOf) -> Self {
-        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         let pixels = u64::from(of.size[0]) * u64::from(of.size[1]);
         let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("first hits"),
@@ -47,8 +50,14 @@ impl FirstHits {
             usage,
             mapped_at_creation: false,
         });
-        let ends = gpu.buffer("ends of the first hits", bytemuck::cast_slice(&[u32::MAX, 0, 0]), usage);
+        let ends = gpu.buffer("ends of the first hits", bytemuck::cast_slice(&NO_ENDS), usage);
         Self { of, buffer, ends, rows: 0, depths: None, most_steps: 0 }
+    }
+
+    /// These of another view of the same size, from its first row.
+    pub fn anew(self, gpu: &Gpu, of: HitsOf) -> Self {
+        gpu.queue.write_buffer(&self.ends, 0, bytemuck::cast_slice(&NO_ENDS));
+        Self { of, rows: 0, depths: None, most_steps: 0, ..self }
     }
 
     /// Takes in that more rows are done, waiting for the device.
