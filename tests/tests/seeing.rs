@@ -3,12 +3,12 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use fovea_app::readback;
-use fovea_tests::{device, scenes};
+use fovea_tests::{device, plant, scenes};
 use glam::{Quat, Vec2, Vec3};
 use tracer::{
     builtin,
     distribution::{Distribution, View, film_direction},
-    film::FilmOptions,
+    film::{FilmOptions, FilmPixel, FilmSnapshot},
     renderer::{FilmPose, Query, RayKind, Renderer},
     scene::Scene,
     view::{
@@ -134,36 +134,37 @@ fn is_near(texel: [u8; 4], expected: [i16; 3], levels: i16) -> bool {
     texel.iter().zip(expected).all(|(shown, wanted)| (i16::from(*shown) - wanted).abs() <= levels)
 }
 
+/// Pixels of a picture of noise that are not what the film's pixels say, `side` by `side` of them in a pixel of the view.
+fn wrong_noise(renderer: &mut Renderer, film: &FilmSnapshot, side: u32) -> usize {
+    let size = [FILM.width / side, FILM.height / side];
+    let settings = ViewSettings { debug_view: DebugView::Error, size, ..as_it_is() };
+    let picture = readback::draw(renderer, &settings).unwrap();
+    let pixels: Vec<_> = film.pixels().collect();
+    let is_wrong = |(index, texel): &(u32, &[u8; 4])| {
+        let (x, y) = (side * (index % size[0]), side * (index / size[0]));
+        let block = || (0..side * side).map(|i| &pixels[((y + i / side) * FILM.width + x + i % side) as usize]);
+        let known = || block().filter(|pixel| pixel.samples >= 2);
+        let mean = |value: &dyn Fn(&FilmPixel) -> f64| known().map(value).sum::<f64>() / known().count().max(1) as f64;
+        let error = mean(&|pixel| pixel.variance_of_mean).sqrt() / mean(&FilmPixel::luminance).max(1e-300);
+        !is_near(**texel, colored(renderer, DebugView::Error, error), 1)
+    };
+    (0..).zip(&picture).filter(is_wrong).count()
+}
+
 #[test]
 fn noise_is_the_standard_error_of_the_films_pixels() {
     let (mut renderer, _) = room(FILM);
     let film = device::trace(&mut renderer, 20 * FILM.pixels()).unwrap();
-    let settings = ViewSettings { debug_view: DebugView::Error, ..as_it_is() };
-    let picture = readback::draw(&mut renderer, &settings).unwrap();
-    let (mut off, mut colors) = (0, std::collections::BTreeSet::new());
-    for (texel, pixel) in picture.iter().zip(film.pixels()) {
-        let relative = pixel.variance_of_mean.sqrt() / pixel.luminance();
-        let expected = if pixel.samples < 2 { 0.0 } else { relative };
-        off += usize::from(!is_near(*texel, colored(&renderer, DebugView::Error, expected), 3));
-        colors.insert(*texel);
+    for side in [1, 2] {
+        let pixels = (FILM.width * FILM.height / (side * side)) as usize;
+        let wrong = wrong_noise(&mut renderer, &film, side);
+        assert!(wrong * 50 <= pixels, "{wrong} of {pixels} pixels have another noise");
     }
-    // Where all samples are nearly the same their variance is what is left of rounding.
-    assert!(off * 50 <= picture.len(), "{off} of {} pixels have another noise", picture.len());
-    assert!(colors.len() > 100, "{} colours", colors.len());
-
-    // Half of the film's resolution: root mean square over four pixels, over their mean.
-    let size = [FILM.width / 2, FILM.height / 2];
-    let picture = readback::draw(&mut renderer, &ViewSettings { size, ..settings }).unwrap();
-    let pixels: Vec<_> = film.pixels().collect();
-    let mut off = 0;
-    for (index, texel) in (0..).zip(&picture) {
-        let (x, y) = (2 * (index % size[0]), 2 * (index / size[0]));
-        let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| &pixels[((y + dy) * FILM.width + x + dx) as usize]);
-        let mean = |value: &dyn Fn(usize) -> f64| (0..4).map(value).sum::<f64>() / 4.0;
-        let error = mean(&|i| four[i].variance_of_mean).sqrt() / mean(&|i| four[i].luminance());
-        off += usize::from(!is_near(*texel, colored(&renderer, DebugView::Error, error), 3));
-    }
-    assert!(off * 50 <= picture.len(), "{off} of {} pixels have another noise", picture.len());
+    // A wrong number of degrees of freedom is noticed.
+    let faulty = plant::exchanged(renderer.shaders(), "view::error", &[("(samples - 1.0)", "samples")]);
+    renderer.set_shaders(faulty).unwrap();
+    let wrong = wrong_noise(&mut renderer, &film, 1);
+    assert!(wrong * 10 > FILM.pixels() as usize, "the fault is noticed in {wrong} pixels alone");
 }
 
 #[test]
