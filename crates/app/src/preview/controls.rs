@@ -59,8 +59,10 @@ impl From<&PreviewArgs> for Controls {
             usual_tone_map: Some(args.picture.tonemap)
                 .filter(|map| *map != ToneMapping::FalseColor)
                 .unwrap_or(ToneMapping::Agx),
-            shown: DebugView::Beauty,
-            inspected: DebugView::SampleDensity,
+            shown: args.picture.show.into(),
+            inspected: Some(args.picture.show.into())
+                .filter(|shown| *shown != DebugView::Beauty)
+                .unwrap_or(DebugView::SampleDensity),
             histogram: false,
             comparison: None,
             paused: false,

@@ -8,9 +8,8 @@ use super::super::controls::Controls;
 use super::super::engine::Look;
 use super::super::seeing::Seen;
 use super::Tracing;
+use crate::readback::FIRST_HITS_AT_ONCE;
 
-/// Rays to first hits in one dispatch.
-const BAND_PIXELS: u32 = 1 << 15;
 /// First hits take at most about this long of one picture; the next one goes on.
 const FIRST_HITS_TIME: Duration = Duration::from_millis(200);
 /// How often pixels are counted while only samples change.
@@ -42,7 +41,7 @@ impl Tracing {
         self.seeing.is_unfinished = settings.debug_view.shows_first_hits();
         let start = Instant::now();
         while self.seeing.is_unfinished && start.elapsed() < FIRST_HITS_TIME {
-            self.seeing.is_unfinished = !self.renderer()?.trace_first_hits(settings, BAND_PIXELS)?;
+            self.seeing.is_unfinished = !self.renderer()?.trace_first_hits(settings, FIRST_HITS_AT_ONCE)?;
         }
         Ok(())
     }
