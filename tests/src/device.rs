@@ -3,9 +3,10 @@
 use std::{path::PathBuf, sync::Arc, time::Instant};
 
 use fovea_sampler::{Angle, Geometry, Inverse, RadialDistribution, model::Reddy2001};
+use glam::Vec3;
 use tracer::{
-    distribution::Distribution,
-    film::{FilmOptions, FilmSnapshot},
+    distribution::{Distribution, film_direction},
+    film::{FilmOptions, FilmSnapshot, SampleRange},
     gpu::{AdapterSelect, Gpu},
     renderer::{LARGEST_BATCH, RenderError, Renderer, RendererOptions, SequenceKind},
     scene::Scene,
@@ -75,6 +76,33 @@ pub fn independent(
     let options = RendererOptions { film, max_bounces, seed, sequence: SequenceKind::Independent };
     let mut renderer = Renderer::new(gpu, &options, distribution).expect("a small film");
     renderer.set_scene(scene).expect("a small scene");
+    renderer
+}
+
+/// A renderer whose film holds `radiance` of each pixel's direction and column, known from 2^20 samples; nothing where that is
+/// `None`.
+///
+/// # Panics
+/// When the film does not fit the device.
+pub fn painted(gpu: &Gpu, film: FilmOptions, radiance: impl Fn(Vec3, u32) -> Option<Vec3>) -> Renderer {
+    let options = RendererOptions { film, ..RendererOptions::default() };
+    let distribution = Distribution::omnidirectional(inverse());
+    let mut renderer = Renderer::new(gpu, &options, distribution).expect("a small film");
+    renderer.set_scene(&crate::scenes::empty(Vec3::ONE)).expect("a small film");
+    let mut snapshot = renderer.snapshot().expect("a small film");
+    let samples = 1_u32 << 20;
+    for (index, words) in snapshot.words.chunks_exact_mut(10).enumerate() {
+        let (x, y) = (index as u32 % film.width, index as u32 / film.width);
+        let Some(value) = radiance(film_direction(&film, x, y), x) else { continue };
+        for (channel, words) in value.to_array().into_iter().zip(words.chunks_exact_mut(2)) {
+            let sum = (f64::from(channel) * f64::from(samples) * snapshot.header.radiance_scale) as u64;
+            words.copy_from_slice(&[sum as u32, (sum >> 32) as u32]);
+        }
+        words[6] = samples;
+    }
+    snapshot.header.ranges =
+        vec![SampleRange { seed: options.seed, first: 0, count: film.pixels() * u64::from(samples) }];
+    renderer.restore(&snapshot).expect("a small film");
     renderer
 }
 

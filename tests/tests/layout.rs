@@ -16,6 +16,7 @@ use tracer::{
         Kernel, KernelConstants, KernelKey, ShaderSources, compose,
         layout::{StructLayout, codes, shared_layouts},
     },
+    view::DebugView,
 };
 
 fn sources() -> Arc<ShaderSources> {
@@ -110,7 +111,7 @@ fn permutations_validate_and_structures_lie_as_on_the_host() {
     for kernel in Kernel::ALL {
         for features in permutations() {
             // Only the path kernels look at the scene's features, and all at the film's.
-            let scene_matters = matches!(kernel, Kernel::Trace | Kernel::Generate | Kernel::Query);
+            let scene_matters = kernel.reads_scene();
             let film_only = SceneFeatures::default().with(Feature::PerspectiveFilm, true);
             if !scene_matters && features != SceneFeatures::default() && features != film_only {
                 continue;
@@ -201,6 +202,18 @@ fn constants_are_those_of_the_host() {
     for (name, value) in &host {
         let twin = shader.iter().find(|(other, _)| other == name);
         assert_eq!(twin.map(|(_, v)| v), Some(value), "{name}");
+    }
+    for (name, view) in [
+        ("DEBUG_SAMPLE_DENSITY", DebugView::SampleDensity),
+        ("DEBUG_ERROR", DebugView::Error),
+        ("DEBUG_STALE", DebugView::Stale),
+        ("DEBUG_ALBEDO", DebugView::Albedo),
+        ("DEBUG_NORMAL", DebugView::Normal),
+        ("DEBUG_DEPTH", DebugView::Depth),
+        ("DEBUG_TRAVERSAL_STEPS", DebugView::TraversalSteps),
+    ] {
+        let twin = shader.iter().find(|(other, _)| other == name);
+        assert_eq!(twin.map(|(_, v)| *v), Some(view as u32), "{name}");
     }
     let of_types = constants(sources.module("types").unwrap());
     for (name, _) in of_types {

@@ -3,41 +3,16 @@
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
-use fovea_tests::{device, scenes};
+use fovea_tests::device;
 use glam::{Quat, Vec3};
 use tracer::{
-    distribution::{Distribution, film_direction},
-    film::{FilmOptions, SampleRange},
-    gpu::Gpu,
+    film::FilmOptions,
     panorama::{EyeSettings, Frustum, Panorama},
-    renderer::{Renderer, RendererOptions},
+    renderer::Renderer,
     view::ToneMap,
 };
 
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
-
-/// A renderer whose film holds `radiance` of each pixel's direction, known from so many samples.
-fn painted(gpu: &Gpu, film: FilmOptions, radiance: impl Fn(Vec3, u32) -> Option<Vec3>) -> Renderer {
-    let options = RendererOptions { film, ..RendererOptions::default() };
-    let distribution = Distribution::omnidirectional(device::inverse());
-    let mut renderer = Renderer::new(gpu, &options, distribution).unwrap();
-    renderer.set_scene(&scenes::empty(Vec3::ONE)).unwrap();
-    let mut snapshot = renderer.snapshot().unwrap();
-    let samples = 1_u32 << 20;
-    for (index, words) in snapshot.words.chunks_exact_mut(10).enumerate() {
-        let (x, y) = (index as u32 % film.width, index as u32 / film.width);
-        let Some(value) = radiance(film_direction(&film, x, y), x) else { continue };
-        for (channel, words) in value.to_array().into_iter().zip(words.chunks_exact_mut(2)) {
-            let sum = (f64::from(channel) * f64::from(samples) * snapshot.header.radiance_scale) as u64;
-            words.copy_from_slice(&[sum as u32, (sum >> 32) as u32]);
-        }
-        words[6] = samples;
-    }
-    snapshot.header.ranges =
-        vec![SampleRange { seed: options.seed, first: 0, count: film.pixels() * u64::from(samples) }];
-    renderer.restore(&snapshot).unwrap();
-    renderer
-}
 
 /// Brings a panorama up to date in parts of so many texels; how many parts it took.
 fn refresh(renderer: &mut Renderer, panorama: &mut Panorama, texels: u64) -> usize {
@@ -98,7 +73,7 @@ fn every_pixel_of_an_eye_shows_its_direction() {
     let gpu = device::gpu();
     let film = FilmOptions::equirect(512, 256);
     let smooth = |d: Vec3| 0.5 + 0.45 * d;
-    let mut renderer = painted(&gpu, film, |d, _| Some(smooth(d)));
+    let mut renderer = device::painted(&gpu, film, |d, _| Some(smooth(d)));
     let mut panorama = Panorama::new(&gpu, &film).unwrap();
     // In parts, as beside a headset's frames, and in one.
     assert!(refresh(&mut renderer, &mut panorama, 1) > 8);
@@ -125,7 +100,7 @@ fn columns_that_meet_at_the_poles_neither_flicker_nor_show() {
     let gpu = device::gpu();
     let film = FilmOptions::equirect(512, 256);
     // Every other column is white: a texel at the pole is 160 times narrower than high.
-    let mut renderer = painted(&gpu, film, |_, x| Some(Vec3::splat((x % 2) as f32)));
+    let mut renderer = device::painted(&gpu, film, |_, x| Some(Vec3::splat((x % 2) as f32)));
     let mut panorama = Panorama::new(&gpu, &film).unwrap();
     refresh(&mut renderer, &mut panorama, u64::MAX);
     let narrow = Frustum::symmetric(0.06, 0.05);
@@ -159,7 +134,7 @@ fn holes_are_filled_from_what_is_around_them_and_stay_when_the_head_turns() {
     // One pixel in 23 is known.
     let mut count = 0;
     let known = std::cell::RefCell::new(&mut count);
-    let mut renderer = painted(&gpu, film, |_, _| {
+    let mut renderer = device::painted(&gpu, film, |_, _| {
         let mut count = known.borrow_mut();
         **count += 1;
         (**count % 23 == 0).then_some(colour)
@@ -179,7 +154,7 @@ fn holes_are_filled_from_what_is_around_them_and_stay_when_the_head_turns() {
 fn the_marker_lies_about_the_gaze() {
     let gpu = device::gpu();
     let film = FilmOptions::equirect(256, 128);
-    let mut renderer = painted(&gpu, film, |_, _| Some(Vec3::ZERO));
+    let mut renderer = device::painted(&gpu, film, |_, _| Some(Vec3::ZERO));
     let mut panorama = Panorama::new(&gpu, &film).unwrap();
     refresh(&mut renderer, &mut panorama, u64::MAX);
     let pose = Quat::from_euler(glam::EulerRot::YXZ, 0.7, -0.4, 0.9);

@@ -16,7 +16,7 @@ pub mod sampler;
 pub mod study;
 pub mod values;
 
-use choices::{Clip, EccentricityAt, Geometry, InverseForm, Mode, Model, Orient, Sequence, ToneMapping};
+use choices::{Clip, EccentricityAt, Geometry, InverseForm, Mode, Model, Orient, Sequence, Show, ToneMapping};
 use gaze::{GazeArgs, PreviewGazeArgs};
 use sampler::SamplerArgs;
 use study::StudyArgs;
@@ -324,6 +324,9 @@ pub struct PictureArgs {
     /// From radiance to display values
     #[arg(long, value_enum, default_value_t = ToneMapping::Agx, value_name = "NAME")]
     pub tonemap: ToneMapping,
+    /// What the picture shows: what is rendered, or what is known about its pixels
+    #[arg(long, value_enum, default_value_t = Show::Picture, value_name = "NAME")]
+    pub show: Show,
 }
 
 /// When `fovea render` stops; 16 samples a pixel unless one is given.

@@ -8,6 +8,9 @@ use tracer::view::ViewSettings;
 /// Format of pictures: 8 bits, already encoded for the display.
 pub const PICTURE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
+/// Rays to first hits in one dispatch.
+pub const FIRST_HITS_AT_ONCE: u32 = 1 << 15;
+
 /// A texture that the renderer draws to, egui shows, and [`read_texture`] reads.
 pub fn picture_texture(gpu: &Gpu, size: [u32; 2]) -> wgpu::Texture {
     gpu.device.create_texture(&wgpu::TextureDescriptor {
@@ -60,13 +63,14 @@ pub fn check_size(gpu: &Gpu, [width, height]: [u32; 2]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Draws a view of the film and reads it back, row by row from the top.
+/// Draws a view of the film and reads it back, row by row from the top. Finds the first hits that it shows.
 ///
 /// # Errors
 /// When the picture is larger than the adapter's textures, a kernel does not compile, or the device is lost.
 pub fn draw(renderer: &mut Renderer, settings: &ViewSettings) -> anyhow::Result<Vec<[u8; 4]>> {
     let gpu = renderer.gpu().clone();
     check_size(&gpu, settings.size)?;
+    while settings.debug_view.shows_first_hits() && !renderer.trace_first_hits(settings, FIRST_HITS_AT_ONCE)? {}
     let texture = picture_texture(&gpu, settings.size);
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("picture") });
     renderer.present(

@@ -4,7 +4,7 @@ use serde_json::{Map, Value, json};
 use tracer::film::FilmHeader;
 use tracer::renderer::SequenceKind;
 
-use crate::cli::choices::{Clip, EccentricityAt, Geometry, InverseForm, Mode, Sequence, ToneMapping};
+use crate::cli::choices::{Clip, EccentricityAt, Geometry, InverseForm, Mode, Sequence, Show, ToneMapping};
 use crate::output::header;
 use crate::sampling::{Acuity, Aim};
 
@@ -80,6 +80,21 @@ impl From<ToneMapping> for tracer::view::ToneMap {
             ToneMapping::Agx => Self::AgX,
             ToneMapping::PbrNeutral => Self::PbrNeutral,
             ToneMapping::Linear => Self::Linear,
+            ToneMapping::FalseColor => Self::FalseColor,
+        }
+    }
+}
+
+impl From<Show> for tracer::view::DebugView {
+    fn from(show: Show) -> Self {
+        match show {
+            Show::Picture => Self::Beauty,
+            Show::Density => Self::SampleDensity,
+            Show::Noise => Self::Error,
+            Show::Albedo => Self::Albedo,
+            Show::Normals => Self::Normal,
+            Show::Depth => Self::Depth,
+            Show::Steps => Self::TraversalSteps,
         }
     }
 }

@@ -166,6 +166,24 @@ fn a_png_shows_the_square_in_every_mode() {
 }
 
 #[test]
+fn a_png_shows_what_is_known_about_its_pixels() {
+    let folder = Folder::new("show");
+    let (scene, out) = (folder.path("square.gltf"), folder.path("out.png"));
+    // The square is white and looks towards the camera; about it there is nothing.
+    let expected = [("albedo", [255, 255, 255], [0, 0, 0]), ("normals", [128, 128, 255], [0, 0, 0])];
+    for (show, at_centre, at_edge) in expected {
+        let arguments = ["render", text(&scene), "-o", text(&out), "--film", "equirect:64x32", "--samples", "64"];
+        let output = fovea(&[arguments.as_slice(), &["--show", show]].concat());
+        assert!(output.status.success(), "{show}: {}", String::from_utf8_lossy(&output.stderr));
+        let picture = image::open(&out).unwrap().to_rgb8();
+        let near =
+            |x, y, wanted: [u8; 3]| picture.get_pixel(x, y).0.iter().zip(wanted).all(|(a, b)| a.abs_diff(b) <= 1);
+        assert!(near(32, 16, at_centre), "{show}: {:?}", picture.get_pixel(32, 16));
+        assert!(near(0, 16, at_edge), "{show}: {:?}", picture.get_pixel(0, 16));
+    }
+}
+
+#[test]
 fn kernels_are_dumped_one_file_each() {
     let folder = Folder::new("dump");
     let (scene, out, kernels) = (folder.path("square.gltf"), folder.path("out.exr"), folder.path("kernels"));

@@ -10,19 +10,23 @@ use clap::Parser;
 use egui::accesskit::Role;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
+use fovea_app::cli::choices::{Mode, ToneMapping};
 use fovea_app::cli::{Cli, PreviewArgs};
 use fovea_app::document::edits::{Edit, Part};
 use fovea_app::document::parameters::{MaterialParameter, Value};
 use fovea_app::document::{Document, Gesture};
 use fovea_app::gaze::hub::GazeHub;
 use fovea_app::preview::attention_tools::{Tool, ToolState};
-use fovea_app::preview::controls::Controls;
+use fovea_app::preview::compare::{self, Comparison};
+use fovea_app::preview::controls::{Controls, Readout};
 use fovea_app::preview::editor::panel::{self, Action, PanelState, Tab};
 use fovea_app::preview::gaze_control::GazeControl;
 use fovea_app::preview::overlay::{self, Facts, Visibility};
+use fovea_app::preview::seeing::{self, Seen};
 use fovea_app::preview::split_panel::{self, SplitTimes};
-use fovea_app::preview::{gaze_panel, theme};
+use fovea_app::preview::{gaze_panel, legend, theme};
 use fovea_app::session::{self, Source};
+use tracer::view::{DebugScale, DebugView, Histogram};
 
 fn args() -> PreviewArgs {
     Cli::parse_from(["fovea"]).preview
@@ -273,10 +277,113 @@ fn the_settings_can_be_operated_by_keyboard() {
     harness.get_by_label("Viewport").click();
     harness.run_steps(2);
     assert_eq!(harness.state().0.exposure_ev, 1.5);
-    assert_eq!(harness.state().0.mode, fovea_app::cli::choices::Mode::Vp);
+    assert_eq!(harness.state().0.mode, Mode::Vp);
     harness.get_by_label("Restart").click();
     harness.run_steps(2);
     assert_eq!(harness.state().2, [overlay::Action::Restart]);
+}
+
+/// A panel's state with what it was told about the picture.
+fn settings_harness<'a>(readout: Readout, controls: Controls) -> Harness<'a, Controls> {
+    let (mut tools, mut split, mut visibility) = (ToolState::default(), SplitTimes::default(), Visibility::default());
+    let draw = move |ui: &mut egui::Ui, controls: &mut Controls| {
+        let facts = Facts { scene: "room.glb", readout, ..Facts::default() };
+        overlay::panel(ui.ctx(), &facts, controls, &mut tools, &mut split, &mut visibility);
+        seeing::keys(ui.ctx(), controls);
+        legend::draw(ui.ctx(), controls, readout.seen.scale, 0.0);
+        if let Some(comparison) = &mut controls.comparison {
+            let rect = ui.max_rect();
+            compare::wipe(ui, rect, controls.mode, comparison, &readout);
+        }
+    };
+    harness(draw, controls)
+}
+
+#[test]
+fn what_is_shown_is_chosen_in_the_panel_and_by_keys_and_has_its_legend() {
+    let scale = DebugScale { low: 0.5, high: 8.0, is_logarithmic: true };
+    let readout = Readout { seen: Seen { scale: Some(scale), ..Seen::default() }, ..Readout::default() };
+    let mut harness = settings_harness(readout, Controls::from(&args()));
+    for (view, name, _) in seeing::VIEWS {
+        harness.get_by_role_and_label(Role::ComboBox, "Show").click();
+        harness.run_steps(5);
+        harness.get_by_role_and_label(Role::Button, name).click();
+        harness.run_steps(5);
+        assert_eq!(harness.state().shown, view, "{name}");
+        assert_reachable(&mut harness, name);
+    }
+    // The last one was the picture again, or is left by the key; the key then goes back to it.
+    harness.state_mut().shown = DebugView::Depth;
+    harness.state_mut().inspected = DebugView::Depth;
+    harness.run_steps(2);
+    assert!(harness.query_by_label("Distance; black: nothing").is_some());
+    for shown in [DebugView::Beauty, DebugView::Depth, DebugView::Beauty] {
+        harness.key_press(egui::Key::X);
+        harness.run_steps(2);
+        assert_eq!(harness.state().shown, shown);
+    }
+    assert!(harness.query_by_label("Distance; black: nothing").is_none());
+    harness.key_press_modifiers(egui::Modifiers::SHIFT, egui::Key::X);
+    harness.run_steps(2);
+    assert_eq!(harness.state().shown, seeing::VIEWS[1].0);
+    harness.state_mut().shown = DebugView::Beauty;
+    harness.state_mut().tone_map = ToneMapping::Linear;
+    for tone_map in [ToneMapping::FalseColor, ToneMapping::Linear] {
+        harness.key_press(egui::Key::K);
+        harness.run_steps(2);
+        assert_eq!(harness.state().tone_map, tone_map);
+        let legend = harness.query_by_label("Stops about middle grey");
+        assert_eq!(legend.is_some(), tone_map == ToneMapping::FalseColor);
+    }
+}
+
+#[test]
+fn the_histogram_is_counted_while_it_is_open_and_says_its_shares() {
+    let mut histogram = Histogram { pixels: 1000, black: 125, clipped: 20, ..Histogram::default() };
+    (histogram.bins[0], histogram.bins[40]) = (125, 875);
+    let readout = Readout { seen: Seen { histogram: Some(histogram), ..Seen::default() }, ..Readout::default() };
+    let mut harness = settings_harness(readout, Controls::from(&args()));
+    assert!(!harness.state().histogram);
+    harness.get_by_label("Histogram").click();
+    harness.run_steps(10);
+    assert!(harness.state().histogram);
+    for said in ["Histogram of the luminance", "12.5 %", "2.0 %"] {
+        assert!(harness.query_by_label(said).is_some(), "{said}");
+    }
+    assert_reachable(&mut harness, "histogram");
+    harness.get_by_label("Histogram").click();
+    harness.run_steps(10);
+    assert!(!harness.state().histogram);
+}
+
+#[test]
+fn two_modes_are_compared_by_panel_keys_and_pointer() {
+    let mut harness = settings_harness(Readout::default(), Controls::from(&args()));
+    harness.get_by_role_and_label(Role::ComboBox, "Compare").click();
+    harness.run_steps(5);
+    // The modes' own buttons have the same names; the list comes after them.
+    harness.query_all_by_role_and_label(Role::Button, "Panorama").last().unwrap().click();
+    harness.run_steps(5);
+    assert_eq!(harness.state().comparison, Some(Comparison { mode: Mode::Od, wipe: 0.5 }));
+    assert_reachable(&mut harness, "comparison");
+    harness.get_by_role_and_label(Role::Slider, "Wipe").set_value_accesskit(25.0);
+    harness.run_steps(2);
+    assert_eq!(harness.state().comparison, Some(Comparison { mode: Mode::Od, wipe: 0.25 }));
+    let from = egui::pos2(0.25 * 1280.0, 600.0);
+    harness.drag_at(from);
+    harness.run_steps(2);
+    harness.hover_at(egui::pos2(960.0, 610.0));
+    harness.run_steps(2);
+    harness.drop_at(egui::pos2(960.0, 610.0));
+    harness.run_steps(2);
+    let wipe = harness.state().comparison.unwrap().wipe;
+    assert!((wipe - 0.75).abs() < 0.01, "{wipe}");
+    harness.key_press_modifiers(egui::Modifiers::SHIFT, egui::Key::C);
+    harness.run_steps(2);
+    assert_eq!(harness.state().comparison.unwrap().mode, Mode::Fv);
+    harness.key_press(egui::Key::C);
+    harness.run_steps(2);
+    assert_eq!(harness.state().comparison, None);
 }
 
 #[test]

@@ -9,6 +9,10 @@ use wesl::{CompileOptions, ModulePath, VirtualResolver, Wesl};
 use crate::{
     features::{Feature, SceneFeatures},
     scene::ContentHash,
+    view::{
+        colors,
+        histogram::{HISTOGRAM_BINS, HISTOGRAM_BINS_PER_STOP, HISTOGRAM_PIXELS_PER_THREAD, HISTOGRAM_WORDS},
+    },
 };
 
 pub mod layout;
@@ -66,6 +70,13 @@ const MODULES: &[(&str, &str)] = &[
     ("view::gather", include_str!("../../../shaders/view/gather.wesl")),
     ("view::pull", include_str!("../../../shaders/view/pull.wesl")),
     ("view::push", include_str!("../../../shaders/view/push.wesl")),
+    ("view::footprint", include_str!("../../../shaders/view/footprint.wesl")),
+    ("view::error", include_str!("../../../shaders/view/error.wesl")),
+    ("view::first_hit", include_str!("../../../shaders/view/first_hit.wesl")),
+    ("view::histogram", include_str!("../../../shaders/view/histogram.wesl")),
+    ("view::colors", include_str!("../../../shaders/view/colors.wesl")),
+    ("view::ring", include_str!("../../../shaders/view/ring.wesl")),
+    ("view::inspect", include_str!("../../../shaders/view/inspect.wesl")),
     ("view::tonemap", include_str!("../../../shaders/view/tonemap.wesl")),
     ("view::present", include_str!("../../../shaders/view/present.wesl")),
     ("vr::bindings", include_str!("../../../shaders/vr/bindings.wesl")),
@@ -94,6 +105,14 @@ pub enum Kernel {
     Push,
     /// Tone mapping to the target.
     Present,
+    /// A debug view to the target.
+    Inspect,
+    /// How noisy the film's pixels in each pixel of the view are.
+    Error,
+    /// What the pixels of the view show first.
+    FirstHit,
+    /// Pixels of the view by luminance.
+    Histogram,
     /// Film to the finest level of the panorama.
     PanoramaResolve,
     /// One level of the panorama from the finer one.
@@ -106,7 +125,7 @@ pub enum Kernel {
 
 impl Kernel {
     /// Every kernel.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 16] = [
         Self::Trace,
         Self::Generate,
         Self::Query,
@@ -115,6 +134,10 @@ impl Kernel {
         Self::Pull,
         Self::Push,
         Self::Present,
+        Self::Inspect,
+        Self::Error,
+        Self::FirstHit,
+        Self::Histogram,
         Self::PanoramaResolve,
         Self::PanoramaPull,
         Self::PanoramaPush,
@@ -132,6 +155,10 @@ impl Kernel {
             Self::Pull => "view::pull",
             Self::Push => "view::push",
             Self::Present => "view::present",
+            Self::Inspect => "view::inspect",
+            Self::Error => "view::error",
+            Self::FirstHit => "view::first_hit",
+            Self::Histogram => "view::histogram",
             Self::PanoramaResolve => "vr::resolve",
             Self::PanoramaPull => "vr::pull",
             Self::PanoramaPush => "vr::push",
@@ -141,7 +168,15 @@ impl Kernel {
 
     /// Whether this is a render pipeline, which draws to a target; the others compute.
     pub const fn draws(self) -> bool {
-        matches!(self, Self::Present | Self::PanoramaResolve | Self::PanoramaPull | Self::PanoramaPush | Self::Eye)
+        matches!(
+            self,
+            Self::Present | Self::Inspect | Self::PanoramaResolve | Self::PanoramaPull | Self::PanoramaPush | Self::Eye
+        )
+    }
+
+    /// Whether the scene's features are flags of this kernel.
+    pub const fn reads_scene(self) -> bool {
+        matches!(self, Self::Trace | Self::Generate | Self::Query | Self::FirstHit)
     }
 
     /// Name of the entry point (the fragment entry where the kernel draws).
@@ -155,6 +190,10 @@ impl Kernel {
             Self::Pull => "pull",
             Self::Push => "push",
             Self::Present => "present",
+            Self::Inspect => "inspect",
+            Self::Error => "error",
+            Self::FirstHit => "trace_first_hits",
+            Self::Histogram => "histogram",
             Self::PanoramaResolve => "resolve",
             Self::PanoramaPull => "pull",
             Self::PanoramaPush => "push",
@@ -251,11 +290,10 @@ impl fmt::Debug for ShaderSources {
 impl fmt::Display for KernelKey {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let name = self.kernel.module().replace("::", "-");
-        match self.kernel {
-            Kernel::Trace | Kernel::Generate | Kernel::Query => {
-                write!(f, "{name}.{}.{}.stack{}", self.features, self.sources.sampler_name, self.constants.stack_size)
-            }
-            _ => write!(f, "{name}"),
+        if self.kernel.reads_scene() {
+            write!(f, "{name}.{}.{}.stack{}", self.features, self.sources.sampler_name, self.constants.stack_size)
+        } else {
+            write!(f, "{name}")
         }
     }
 }
@@ -304,10 +342,15 @@ fn constants_module(c: &KernelConstants) -> String {
         ("GLASS_SIZE", GLASS_SIZE),
         ("GLASS_LAYERS", GLASS_LAYERS),
         ("FIRST_ROULETTE_BOUNCE", FIRST_ROULETTE_BOUNCE),
+        ("HISTOGRAM_BINS", HISTOGRAM_BINS as u32),
+        ("HISTOGRAM_BINS_PER_STOP", HISTOGRAM_BINS_PER_STOP as u32),
+        ("HISTOGRAM_WORDS", HISTOGRAM_WORDS as u32),
+        ("HISTOGRAM_PIXELS_PER_THREAD", HISTOGRAM_PIXELS_PER_THREAD),
         ("STACK_SIZE", c.stack_size.max(1)),
         ("ROOT_NODE", c.root_node),
         ("ENVIRONMENT_CELLS_X", c.environment_cells[0].max(1)),
         ("ENVIRONMENT_CELLS_Y", c.environment_cells[1].max(1)),
     ];
-    numbers.iter().map(|(name, value)| format!("const {name}: u32 = {value}u;\n")).collect()
+    let numbers: String = numbers.iter().map(|(name, value)| format!("const {name}: u32 = {value}u;\n")).collect();
+    numbers + &colors::constants()
 }

@@ -6,7 +6,9 @@ use glam::Vec3;
 use thiserror::Error;
 
 mod batch;
+mod beside;
 mod generation;
+mod inspect;
 mod options;
 mod panorama;
 mod query;
@@ -34,7 +36,7 @@ use crate::{
     },
     scene::{ContentHash, Scene},
     upload::{SceneCache, SceneOnGpu, UploadError},
-    view::{ViewRenderer, ViewSettings},
+    view::{FilmSource, ViewRenderer, ViewSettings, ViewTarget},
 };
 
 /// Why the renderer cannot go on.
@@ -100,6 +102,8 @@ pub struct Renderer {
     /// What the film held when it was restored from a snapshot.
     restored: Vec<SampleRange>,
     scene_hash: ContentHash,
+    /// Counts the scenes that were set.
+    scene_version: u64,
     view: ViewRenderer,
 }
 
@@ -147,6 +151,7 @@ impl Renderer {
             next_sample: 0,
             restored: Vec::new(),
             scene_hash: ContentHash::default(),
+            scene_version: 0,
         };
         renderer.upload_pixel_list();
         Ok(renderer)
@@ -171,6 +176,7 @@ impl Renderer {
         }
         let kernel_compile_secs = started.elapsed().as_secs_f64();
         self.scene_hash = scene.content_hash();
+        self.scene_version += 1;
         self.split_light_samples(scene)?;
         let environment_share = self.scene.as_ref().map_or(0.0, |scene| scene.environment_probability);
         self.restart();
@@ -330,8 +336,7 @@ impl Renderer {
     /// Starts the film anew with other random numbers; nothing of the old picture is shown.
     pub fn set_randomness(&mut self, seed: u32, sequence: SequenceKind) {
         (self.options.seed, self.options.sequence) = (seed, sequence);
-        self.view.forget();
-        self.restart();
+        self.restart_clean();
     }
 
     /// Samples in the film: traced since the last restart, and those of the snapshot that it was restored from.
@@ -425,19 +430,24 @@ impl Renderer {
         target: &wgpu::TextureView,
         format: wgpu::TextureFormat,
     ) -> Result<(), RenderError> {
-        let keys = Kernel::ALL.map(|kernel| (kernel, self.key(kernel)));
-        let quanta_to_radiance = 1.0 / self.film_scales().0;
-        self.view.record(
-            encoder,
-            &mut self.pipelines,
-            &|kernel| keys.iter().find(|(k, _)| *k == kernel).map(|(_, key)| key.clone()),
-            &self.film,
-            self.pose.world_from_film,
-            quanta_to_radiance,
-            settings,
-            target,
-            format,
-        )
+        self.present_to(encoder, settings, &ViewTarget { view: target, format, part: None })
+    }
+
+    /// As [`Renderer::present`], to a part of a target where it says so.
+    ///
+    /// # Errors
+    /// When a kernel does not compile for the target's format.
+    pub fn present_to(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        settings: &ViewSettings,
+        target: &ViewTarget<'_>,
+    ) -> Result<(), RenderError> {
+        self.drop_other_hits(settings);
+        let keys = Kernel::ALL.map(|kernel| self.key(kernel));
+        let key = |kernel| keys.iter().find(|key| key.kernel == kernel).expect("every kernel has a key").clone();
+        let source = FilmSource::new(&self.film, self.pose.world_from_film, self.film_scales());
+        self.view.record(encoder, &mut self.pipelines, &key, &source, settings, target)
     }
 
     /// The present kernels' text by their label.
@@ -459,7 +469,7 @@ impl Renderer {
         let perspective = matches!(self.options.film.mapping, FilmMapping::Perspective { .. });
         let scene = self.scene.as_ref();
         let own = scene.map(|s| s.features).unwrap_or_default();
-        let features = if kernel == Kernel::Query {
+        let features = if matches!(kernel, Kernel::Query | Kernel::FirstHit) {
             own
         } else if kernel == Kernel::Trace {
             own.union(self.spare_features)
@@ -471,7 +481,7 @@ impl Renderer {
         KernelKey {
             kernel,
             features: features.with(Feature::PerspectiveFilm, perspective),
-            constants: if matches!(kernel, Kernel::Trace | Kernel::Query) {
+            constants: if matches!(kernel, Kernel::Trace | Kernel::Query | Kernel::FirstHit) {
                 scene.map(|s| s.constants).unwrap_or_default()
             } else {
                 KernelConstants::default()

@@ -71,8 +71,8 @@ pub struct UploadReport {
     pub lights: u32,
 }
 
-/// A scene on the device, ready to bind.
-#[derive(Debug)]
+/// A scene on the device, ready to bind. Clones share what is there.
+#[derive(Clone, Debug)]
 pub struct SceneOnGpu {
     /// What the kernels must contain.
     pub features: SceneFeatures,
@@ -97,7 +97,7 @@ pub struct SceneOnGpu {
 }
 
 /// Group 1 of the path kernels.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct SceneBindings {
     /// Storage buffers, binding 0 to 7.
     pub buffers: [wgpu::Buffer; 8],

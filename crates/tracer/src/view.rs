@@ -7,15 +7,24 @@ use wgpu::BufferUsages;
 
 use crate::{
     distribution::View,
-    film::{Film, FilmOptions, ReadError, read_ranges},
+    film::{Film, ReadError, read_buffer, read_ranges},
     gpu::Gpu,
     kernels::{
-        Kernel, KernelKey, TILE_SIZE,
+        Kernel, KernelKey, TILE_SIZE, WORKGROUP_SIZE,
         layout::{self, ViewParams, codes},
         pipelines::PipelineCache,
     },
     renderer::RenderError,
 };
+
+pub mod colors;
+mod debug;
+mod first_hits;
+pub mod histogram;
+
+pub use debug::{DebugScale, DebugView};
+pub(crate) use first_hits::{FirstHits, HitsOf};
+pub use histogram::Histogram;
 
 /// View transform from radiance to display.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -27,16 +36,8 @@ pub enum ToneMap {
     PbrNeutral,
     /// sRGB encoding alone; clips at 1.
     Linear,
-}
-
-/// What is shown instead of, or beside, the picture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub enum DebugView {
-    /// The picture.
-    #[default]
-    Beauty,
-    /// Samples per pixel of the view, logarithmic.
-    SampleDensity,
+    /// A colour for each stop of luminance about middle grey ([`colors::FALSE_COLORS`]).
+    FalseColor,
 }
 
 /// What part of the film is shown.
@@ -71,8 +72,32 @@ pub struct ViewSettings {
 /// Samples at which a pixel's own mean weighs as much as its neighbourhood's.
 pub(crate) const CONFIDENCE_SAMPLES: f32 = 1.0;
 
-/// Stops of sample density from the darkest colour of its debug view, 1/16 a pixel, to white, 4096.
-const DENSITY_STOPS: f32 = 16.0;
+/// Where a view is drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct ViewTarget<'a> {
+    /// A texture of the view's size.
+    pub view: &'a wgpu::TextureView,
+    /// Its format.
+    pub format: wgpu::TextureFormat,
+    /// Left, top, width and height of the pixels that are drawn; the others stay. `None` draws all.
+    pub part: Option<[u32; 4]>,
+}
+
+/// The film that a view is of, and what its numbers mean.
+pub(crate) struct FilmSource<'a> {
+    pub film: &'a Film,
+    pub world_from_film: Quat,
+    pub quanta_to_radiance: f32,
+    /// Quanta of luminance, in second moments, that one quantum of radiance is.
+    pub luminance_quanta: f32,
+}
+
+impl<'a> FilmSource<'a> {
+    /// `scales`: quanta per unit of radiance and of luminance.
+    pub fn new(film: &'a Film, world_from_film: Quat, (radiance, luminance): (f32, f32)) -> Self {
+        Self { film, world_from_film, quanta_to_radiance: 1.0 / radiance, luminance_quanta: luminance / radiance }
+    }
+}
 
 /// Buffers of the view's size and the passes over them.
 #[derive(Debug)]
@@ -83,6 +108,11 @@ pub(crate) struct ViewRenderer {
     pyramid: Option<wgpu::Buffer>,
     stale: Option<(wgpu::Buffer, View, [u32; 2])>,
     last: Option<ViewProjection>,
+    /// While a debug view shows them.
+    pub hits: Option<FirstHits>,
+    errors: Option<wgpu::Buffer>,
+    /// Bound in the place of what a debug view does not read.
+    nothing: wgpu::Buffer,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,7 +123,17 @@ struct Level {
 
 impl ViewRenderer {
     pub fn new(gpu: &Gpu) -> Self {
-        Self { gpu: gpu.clone(), size: [0; 2], levels: Vec::new(), pyramid: None, stale: None, last: None }
+        Self {
+            gpu: gpu.clone(),
+            size: [0; 2],
+            levels: Vec::new(),
+            pyramid: None,
+            stale: None,
+            last: None,
+            hits: None,
+            errors: None,
+            nothing: gpu.buffer("nothing", &[0; 64], BufferUsages::STORAGE),
+        }
     }
 
     /// Keeps the finished picture, to be shown reprojected until the new film covers it.
@@ -149,34 +189,44 @@ impl ViewRenderer {
         }));
     }
 
-    /// Records gather, pull, push and present.
-    #[expect(clippy::too_many_arguments, reason = "one call site, and each is a different thing")]
+    /// What the ends of a debug view's colours stand for; `None` where it has no such scale or nothing is known yet.
+    pub fn scale(&self, debug_view: DebugView) -> Option<DebugScale> {
+        match debug_view {
+            DebugView::SampleDensity => Some(DebugScale::DENSITY),
+            DebugView::Error => Some(DebugScale::ERROR),
+            DebugView::Depth => self.hits.as_ref().and_then(FirstHits::depths),
+            DebugView::TraversalSteps => self.hits.as_ref().and_then(FirstHits::steps),
+            DebugView::Beauty | DebugView::Stale | DebugView::Albedo | DebugView::Normal => None,
+        }
+    }
+
+    /// Records gather, pull, push, what a debug view needs beside, and the drawing.
     pub fn record(
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
         pipelines: &mut PipelineCache,
-        key: &dyn Fn(Kernel) -> Option<KernelKey>,
-        film: &Film,
-        world_from_film: Quat,
-        quanta_to_radiance: f32,
+        key: &dyn Fn(Kernel) -> KernelKey,
+        source: &FilmSource<'_>,
         settings: &ViewSettings,
-        target: &wgpu::TextureView,
-        format: wgpu::TextureFormat,
+        target: &ViewTarget<'_>,
     ) -> Result<(), RenderError> {
         self.resize(settings.size);
         let gpu = self.gpu.clone();
         let device = &gpu.device;
-        let compute = |pipelines: &mut PipelineCache, kernel| {
-            let key = key(kernel).expect("every kernel has a key");
-            pipelines.compute(device, &key)
-        };
-        let gather = compute(pipelines, Kernel::Gather)?;
-        let pull = compute(pipelines, Kernel::Pull)?;
-        let push = compute(pipelines, Kernel::Push)?;
-        let present = pipelines.drawn(device, &key(Kernel::Present).expect("every kernel has a key"), format)?;
+        let film = source.film;
+        let shows_errors = settings.debug_view == DebugView::Error;
+        self.make_room(settings, shows_errors);
+        let gather = pipelines.compute(device, &key(Kernel::Gather))?;
+        let error = shows_errors.then(|| pipelines.compute(device, &key(Kernel::Error))).transpose()?;
+        let pull = pipelines.compute(device, &key(Kernel::Pull))?;
+        let push = pipelines.compute(device, &key(Kernel::Push))?;
+        let is_picture = settings.debug_view == DebugView::Beauty;
+        let draw = if is_picture { Kernel::Present } else { Kernel::Inspect };
+        let draw = pipelines.drawn(device, &key(draw), target.format)?;
+        let errors = self.errors.as_ref().unwrap_or(&self.nothing);
         let pyramid = self.pyramid.as_ref().expect("made by resize");
         let stale = self.stale.as_ref().map_or(pyramid, |(buffer, ..)| buffer);
-        let base = self.params(&film.options, world_from_film, quanta_to_radiance, settings);
+        let base = self.params(source, settings);
         let upload =
             |params: ViewParams| gpu.buffer("view parameters", bytemuck::bytes_of(&params), BufferUsages::UNIFORM);
         let tiles = |size: [u32; 2]| [size[0].div_ceil(TILE_SIZE), size[1].div_ceil(TILE_SIZE)];
@@ -188,16 +238,17 @@ impl ViewRenderer {
             for slab in &film.slabs {
                 let params =
                     ViewParams { first_slab_pixel: slab.first_pixel, slab_pixel_count: slab.pixel_count, ..base };
-                let group = gather.bind(
-                    device,
-                    0,
-                    &[
-                        (0, upload(params).as_entire_binding()),
-                        (1, slab.buffer.as_entire_binding()),
-                        (2, pyramid.as_entire_binding()),
-                    ],
-                );
-                gather.dispatch(&mut pass, &[&group], tiles(settings.size));
+                let params = upload(params);
+                let resources = [
+                    (0, params.as_entire_binding()),
+                    (1, slab.buffer.as_entire_binding()),
+                    (2, pyramid.as_entire_binding()),
+                    (4, errors.as_entire_binding()),
+                ];
+                for kernel in std::iter::once(&gather).chain(&error) {
+                    let group = kernel.bind(device, 0, &resources);
+                    kernel.dispatch(&mut pass, &[&group], tiles(settings.size));
+                }
             }
             let pairs: Vec<_> = self.levels.windows(2).map(|w| (w[0], w[1])).enumerate().collect();
             let level_params = |level: usize, fine: Level, coarse: Level| ViewParams {
@@ -229,26 +280,83 @@ impl ViewRenderer {
                 push.dispatch(&mut pass, &[&group], tiles(fine.size));
             }
         }
-        let finished_bytes = u64::from(settings.size[0]) * u64::from(settings.size[1]) * 16;
-        let finished = wgpu::BufferBinding { buffer: pyramid, offset: 0, size: wgpu::BufferSize::new(finished_bytes) };
-        let group = present.bind(
+        let hits = self.hits.as_ref().map_or(&self.nothing, |hits| &hits.buffer);
+        let group = draw.bind(
             device,
             0,
-            &[(0, upload(base).as_entire_binding()), (1, wgpu::BindingResource::Buffer(finished))],
+            &[
+                (0, upload(base).as_entire_binding()),
+                (1, finished_binding(pyramid, settings.size)),
+                (4, errors.as_entire_binding()),
+                (5, hits.as_entire_binding()),
+            ],
         );
-        present.cover(encoder, target, &group, None);
+        draw.cover(encoder, target.view, &group, target.part);
         self.last = Some(settings.projection);
         Ok(())
     }
 
-    fn params(
+    /// Buffers that a debug view needs are there, those that it does not need are gone.
+    fn make_room(&mut self, settings: &ViewSettings, shows_errors: bool) {
+        let bytes = u64::from(settings.size[0]) * u64::from(settings.size[1]) * 16;
+        if !shows_errors {
+            self.errors = None;
+        } else if self.errors.as_ref().is_none_or(|errors| errors.size() != bytes) {
+            self.errors = Some(self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("errors in the view"),
+                size: bytes,
+                usage: BufferUsages::STORAGE,
+                mapped_at_creation: false,
+            }));
+        }
+        if !settings.debug_view.shows_first_hits() {
+            self.hits = None;
+        }
+    }
+
+    /// Counts the pixels of the view that was presented last by luminance, with the exposure and tone map of `settings`; waits
+    /// for the device. All are 0 before a view was presented.
+    pub fn histogram(
         &self,
-        film: &FilmOptions,
-        world_from_film: Quat,
-        quanta_to_radiance: f32,
+        pipelines: &mut PipelineCache,
+        key: &KernelKey,
+        source: &FilmSource<'_>,
         settings: &ViewSettings,
-    ) -> ViewParams {
-        let film_from_world = layout::columns(Mat3::from_quat(world_from_film.inverse()));
+    ) -> Result<Histogram, RenderError> {
+        let Some(pyramid) = &self.pyramid else { return Ok(Histogram::default()) };
+        let device = &self.gpu.device;
+        let kernel = pipelines.compute(device, key)?;
+        let params = self.params(source, &ViewSettings { size: self.size, ..*settings });
+        let params = self.gpu.buffer("view parameters", bytemuck::bytes_of(&params), BufferUsages::UNIFORM);
+        let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
+        let counts = self.gpu.buffer("histogram", &[0; 4 * histogram::HISTOGRAM_WORDS], usage);
+        let group = kernel.bind(
+            device,
+            0,
+            &[
+                (0, params.as_entire_binding()),
+                (1, finished_binding(pyramid, self.size)),
+                (2, counts.as_entire_binding()),
+            ],
+        );
+        let pixels = self.size[0] * self.size[1];
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("histogram") });
+        {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: Some(kernel.label()),
+                timestamp_writes: None,
+            });
+            let workgroups = pixels.div_ceil(WORKGROUP_SIZE * histogram::HISTOGRAM_PIXELS_PER_THREAD);
+            kernel.dispatch(&mut pass, &[&group], [workgroups, 1]);
+        }
+        self.gpu.queue.submit([encoder.finish()]);
+        Ok(Histogram::from_words(&read_buffer::<u32>(&self.gpu, &counts)?, pixels))
+    }
+
+    fn params(&self, source: &FilmSource<'_>, settings: &ViewSettings) -> ViewParams {
+        let film = &source.film.options;
+        let film_from_world = layout::columns(Mat3::from_quat(source.world_from_film.inverse()));
+        let scale = self.scale(settings.debug_view).unwrap_or(DebugScale::DENSITY);
         let mut params = ViewParams {
             kind: codes::VIEW_EQUIRECT,
             size: settings.size,
@@ -257,13 +365,17 @@ impl ViewRenderer {
             view_half_extent: film.half_extent(),
             film_half_extent: film.half_extent(),
             film_size: [film.width, film.height],
-            quanta_to_radiance,
+            quanta_to_radiance: source.quanta_to_radiance,
             confidence_samples: CONFIDENCE_SAMPLES,
             exposure: settings.exposure_ev.exp2(),
             tone_map: settings.tone_map as u32,
             debug_view: settings.debug_view as u32,
-            debug_scale: 1.0 / DENSITY_STOPS,
             fill: u32::from(settings.fill),
+            debug_low: scale.low,
+            debug_high: scale.high,
+            is_debug_logarithmic: u32::from(scale.is_logarithmic),
+            hit_rows: self.hits.as_ref().map_or(0, |hits| hits.rows),
+            luminance_quanta: source.luminance_quanta,
             stale_size: [1; 2],
             stale_half_extent: [1.0; 2],
             ..bytemuck::Zeroable::zeroed()
@@ -285,4 +397,14 @@ impl ViewRenderer {
         }
         params
     }
+}
+
+/// The finished level 0 of a pyramid.
+fn finished_binding(pyramid: &wgpu::Buffer, size: [u32; 2]) -> wgpu::BindingResource<'_> {
+    let bytes = u64::from(size[0]) * u64::from(size[1]) * 16;
+    wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+        buffer: pyramid,
+        offset: 0,
+        size: wgpu::BufferSize::new(bytes),
+    })
 }

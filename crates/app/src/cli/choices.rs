@@ -123,4 +123,25 @@ pub enum ToneMapping {
     PbrNeutral,
     /// Clipped at 1
     Linear,
+    /// A colour for each stop of luminance about middle grey
+    FalseColor,
+}
+
+/// What a picture shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Show {
+    /// The picture
+    Picture,
+    /// Samples per pixel
+    Density,
+    /// Standard error of the film's pixels over their brightness
+    Noise,
+    /// Base colour of what is seen first
+    Albedo,
+    /// Its shading normal
+    Normals,
+    /// Its distance
+    Depth,
+    /// Nodes and triangles that the ray to it visits
+    Steps,
 }

@@ -13,7 +13,7 @@ use tracer::film::{FilmMapping, FilmOptions};
 use tracer::gpu::{AdapterSelect, Gpu};
 use tracer::renderer::{FilmPose, RenderStatistics, Renderer, RendererOptions, SceneReport, StopCondition};
 use tracer::scene::Scene;
-use tracer::view::{DebugView, ViewProjection, ViewSettings};
+use tracer::view::{ViewProjection, ViewSettings};
 
 use super::print_json;
 use crate::cli::choices::{EccentricityAt, Mode, Orient};
@@ -275,7 +275,7 @@ fn whole_film(args: &RenderArgs, film: &FilmOptions) -> ViewSettings {
         size: [film.width, film.height],
         exposure_ev: args.picture.exposure,
         tone_map: args.picture.tonemap.into(),
-        debug_view: DebugView::Beauty,
+        debug_view: args.picture.show.into(),
         fill: true,
         ring: None,
     }

@@ -2,22 +2,16 @@
 
 use std::time::Duration;
 
+use tracer::view::DebugView;
+
+use super::compare::Comparison;
+use super::seeing::Seen;
 use crate::attention::Attention;
 use crate::cli::PreviewArgs;
 use crate::cli::choices::{Clip, EccentricityAt, Mode, ToneMapping};
 use crate::convergence::Convergence;
 use crate::sampling::Acuity;
 use crate::screen::ScreenGeometry;
-
-/// What the picture shows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Shown {
-    /// The rendered picture.
-    #[default]
-    Picture,
-    /// Samples per pixel of the film, in colours by their logarithm.
-    Density,
-}
 
 /// Settings of the window. None of them restarts the film.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,8 +30,16 @@ pub struct Controls {
     pub exposure_ev: f32,
     /// From radiance to display values.
     pub tone_map: ToneMapping,
+    /// What one key goes back to from false colour.
+    pub usual_tone_map: ToneMapping,
     /// What the picture shows.
-    pub shown: Shown,
+    pub shown: DebugView,
+    /// What one key shows in the picture's place.
+    pub inspected: DebugView,
+    /// The histogram is looked at.
+    pub histogram: bool,
+    /// A second mode that is shown beside the first.
+    pub comparison: Option<Comparison>,
     /// No tracing while true.
     pub paused: bool,
     /// Where else samples are wanted.
@@ -54,7 +56,15 @@ impl From<&PreviewArgs> for Controls {
             screen: args.sampling.screen(),
             exposure_ev: args.picture.exposure,
             tone_map: args.picture.tonemap,
-            shown: Shown::Picture,
+            usual_tone_map: Some(args.picture.tonemap)
+                .filter(|map| *map != ToneMapping::FalseColor)
+                .unwrap_or(ToneMapping::Agx),
+            shown: args.picture.show.into(),
+            inspected: Some(args.picture.show.into())
+                .filter(|shown| *shown != DebugView::Beauty)
+                .unwrap_or(DebugView::SampleDensity),
+            histogram: false,
+            comparison: None,
             paused: false,
             attention: Attention::default(),
         }
@@ -78,6 +88,8 @@ pub struct Readout {
     pub traced: Duration,
     /// Samples that were not finite and were dropped.
     pub non_finite_dropped: u64,
+    /// What is known about the picture as it was last shown.
+    pub seen: Seen,
 }
 
 /// Short names and explanations of the modes, in the order of their buttons.
@@ -89,8 +101,12 @@ pub const MODES: [(Mode, &str, &str); 4] = [
 ];
 
 /// Names of the tone maps.
-pub const TONE_MAPS: [(ToneMapping, &str); 3] =
-    [(ToneMapping::Agx, "AgX"), (ToneMapping::PbrNeutral, "PBR Neutral"), (ToneMapping::Linear, "Linear")];
+pub const TONE_MAPS: [(ToneMapping, &str); 4] = [
+    (ToneMapping::Agx, "AgX"),
+    (ToneMapping::PbrNeutral, "PBR Neutral"),
+    (ToneMapping::Linear, "Linear"),
+    (ToneMapping::FalseColor, "False colour"),
+];
 
 /// A count with a metric prefix and three digits: `1.23 M`.
 pub fn metric(value: f64) -> String {

@@ -347,11 +347,11 @@ impl Worker {
             self.pacing.restart();
             self.moved_at = Some(Instant::now());
         }
-        if !look.controls.paused {
+        if !look.controls.paused && !self.tracing.is_unfinished() {
             let (samples, took) = self.tracing.trace(self.pacing.batch())?;
             self.traced += took;
             self.pacing.measured(samples, took, self.show_time);
-            self.rate.add(self.tracing.samples(), Instant::now());
+            self.rate.add(self.tracing.samples_of_all(), Instant::now());
         }
         if self.is_due(look) {
             self.show(look)?;
@@ -383,6 +383,7 @@ impl Worker {
             || last.standpoint != look.standpoint
             || last.size_px != look.size_px
             || last.controls != look.controls
+            || self.tracing.is_unfinished()
             || shown.samples != self.tracing.samples()
                 && shown.at.elapsed() >= self.pacing.show_interval(self.show_time)
     }
@@ -433,6 +434,7 @@ impl Worker {
             elapsed: self.tracing.elapsed(),
             traced: self.traced,
             non_finite_dropped: self.non_finite_dropped,
+            seen: self.tracing.seen(),
         }
     }
 

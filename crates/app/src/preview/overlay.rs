@@ -6,8 +6,10 @@ use egui::{Align, Align2, Area, ComboBox, Context, DragValue, Grid, Id, Layout, 
 use glam::Vec3;
 
 use super::attention_tools::{self, ToolState};
-use super::controls::{Controls, MODES, Readout, Shown, TONE_MAPS, clock, metric};
+use super::controls::{Controls, MODES, Readout, TONE_MAPS, clock, metric};
 use super::engine::HeadsetReadout;
+use super::histogram;
+use super::seeing;
 use super::split_panel::{self, SplitTimes};
 use super::theme;
 use crate::cli::choices::{Clip, EccentricityAt, Mode, Model};
@@ -20,7 +22,7 @@ const OUTLINE_HINT: &str = "Ready: at the gaze, noise is below 20 % of the brigh
 const MATERIAL_HINT: &str = "Ready: at the gaze, noise is below 5 % of the brightness (95 % confidence)";
 
 /// What the keys do, as `?` lists them.
-pub const KEYS: [(&str, &str); 28] = [
+pub const KEYS: [(&str, &str); 33] = [
     ("Drag", "look around; on a handle: move, turn or scale"),
     ("Click", "select what is there"),
     ("Wheel", "zoom at the pointer"),
@@ -39,11 +41,16 @@ pub const KEYS: [(&str, &str); 28] = [
     ("Space", "pause"),
     ("R", "restart"),
     ("F", "ring at the fovea"),
+    ("Shift F", "rings of eccentricity"),
     ("G", "gaze: sources, drift, recording"),
     ("V", "into the headset and out"),
     ("L", "lock the gaze where it is, or free it"),
     ("O  P", "split times: the outline, the material is visible"),
-    ("X", "sample density"),
+    ("X", "debug view: sample density, or what it last was"),
+    ("Shift X", "next debug view"),
+    ("K", "false colour"),
+    ("C", "compare with another mode; drag the line"),
+    ("Shift C", "next mode on the right"),
     ("[  ]", "exposure"),
     ("Ctrl S", "save the picture as PNG"),
     ("Ctrl Shift S", "save the film as EXR"),
@@ -60,6 +67,8 @@ pub struct Visibility {
     pub keys: bool,
     /// The ring at the fovea.
     pub ring: bool,
+    /// Rings of equal eccentricity.
+    pub eccentricity: bool,
     /// The panel about gaze.
     pub gaze: bool,
     /// The panel of the scene.
@@ -68,7 +77,7 @@ pub struct Visibility {
 
 impl Default for Visibility {
     fn default() -> Self {
-        Self { panel: true, keys: false, ring: true, gaze: false, editor: false }
+        Self { panel: true, keys: false, ring: true, eccentricity: false, gaze: false, editor: false }
     }
 }
 
@@ -142,6 +151,10 @@ pub fn panel(
             buttons(ui, controls, &mut actions);
             headset(ui, facts.headset, &mut actions);
             ui.separator();
+            let histogram = ui.collapsing("Histogram", |ui| {
+                histogram::panel(ui, facts.readout.seen.histogram.as_ref());
+            });
+            controls.histogram = !histogram.fully_closed();
             ui.collapsing("Attention", |ui| {
                 attention_tools::panel(ui, tools, &mut controls.attention, facts.gaze);
             });
@@ -243,14 +256,7 @@ fn picture(ui: &mut Ui, controls: &mut Controls) {
         combo.response.labelled_by(label.id);
         ui.end_row();
 
-        ui.label(RichText::new("Show").weak());
-        ui.horizontal(|ui| {
-            ui.spacing_mut().item_spacing.x = 3.0;
-            ui.selectable_value(&mut controls.shown, Shown::Picture, "Picture");
-            ui.selectable_value(&mut controls.shown, Shown::Density, "Density")
-                .on_hover_text("Samples per pixel of the view: black none, dark blue 1/16, green 16, white 4096");
-        });
-        ui.end_row();
+        seeing::rows(ui, controls);
     });
 }
 
@@ -331,6 +337,7 @@ fn sampling(ui: &mut Ui, facts: &Facts<'_>, controls: &mut Controls, visibility:
         controls.eccentricity = if at_eye { EccentricityAt::Eye } else { EccentricityAt::Scene };
     });
     ui.checkbox(&mut visibility.ring, "Ring at the fovea");
+    ui.checkbox(&mut visibility.eccentricity, "Rings of eccentricity").on_hover_text("Shift F: degrees from the gaze");
     Grid::new("screen").num_columns(2).spacing([8.0, 3.0]).show(ui, |ui| {
         let screen = &mut controls.screen;
         for (name, value, range) in [

@@ -9,7 +9,7 @@ pub const NOTICE: Color32 = Color32::from_rgb(240, 200, 120);
 /// Something that went wrong.
 pub const ERROR: Color32 = Color32::from_rgb(244, 128, 110);
 /// Behind text that lies on the picture; the picture shows through a little.
-const BACKDROP: Color32 = Color32::from_rgba_premultiplied(17, 18, 20, 228);
+pub const BACKDROP: Color32 = Color32::from_rgba_premultiplied(17, 18, 20, 228);
 const TEXT: Color32 = Color32::from_rgb(214, 216, 220);
 const BRIGHT: Color32 = Color32::from_rgb(244, 245, 247);
 

@@ -12,9 +12,8 @@ use tracer::film::{FilmMapping, FilmSnapshot};
 use tracer::gpu::Gpu;
 use tracer::renderer::{FilmPose, Renderer, RendererOptions};
 use tracer::scene::Scene;
-use tracer::view::{DebugView, ViewProjection, ViewSettings};
+use tracer::view::{ViewProjection, ViewSettings};
 
-use super::controls::Shown;
 use super::engine::{Look, Picture};
 use crate::attention::Attention;
 use crate::cli::PreviewArgs;
@@ -28,6 +27,11 @@ use crate::sampling::{Acuity, Aim, GazePoint};
 use crate::settings::RunSettings;
 use crate::tev::TevPicture;
 use crate::view::View;
+use compare::Side;
+use seeing::Seeing;
+
+mod compare;
+mod seeing;
 
 /// The read-out at the gaze is a mean over so many pixels to each side.
 const READOUT_RADIUS_PX: u32 = 3;
@@ -81,6 +85,9 @@ pub struct Tracing {
     traced: Duration,
     /// The film was taken over: it stays as long as it covers the view, however coarse it is.
     keeps_film: bool,
+    /// The other film of a comparison.
+    beside: Option<Side>,
+    seeing: Seeing,
 }
 
 impl Tracing {
@@ -99,6 +106,8 @@ impl Tracing {
             view: None,
             traced: Duration::ZERO,
             keeps_film: false,
+            beside: None,
+            seeing: Seeing::default(),
         }
     }
 
@@ -118,6 +127,9 @@ impl Tracing {
             Some(Open { renderer: Some(renderer), scene: shown, .. }) => {
                 renderer.set_scene(&scene)?;
                 *shown = scene;
+                if let Some(side) = &mut self.beside {
+                    side.follow_scene(renderer)?;
+                }
             }
             _ => self.open = Some(Open { scene, renderer: None, plan: None }),
         }
@@ -140,6 +152,7 @@ impl Tracing {
         open.renderer = Some(renderer);
         // The next look says where samples go, and whether another film would suit it better.
         (self.aim, self.view, self.keeps_film) = (None, None, true);
+        self.beside = None;
         self.traced = Duration::ZERO;
         Ok(())
     }
@@ -200,6 +213,7 @@ impl Tracing {
             }
         }
         let moved = self.set_pose_and_aim(look, aim, &inverse)?;
+        self.follow_comparison(look, aim, &inverse)?;
         let turned = self.view != Some(view);
         self.view = Some(view);
         Ok(moved || turned)
@@ -329,6 +343,7 @@ impl Tracing {
             (open.renderer, open.plan) = (None, None);
         }
         self.keeps_film = false;
+        self.beside = None;
     }
 
     /// A number that no picture has had.
@@ -337,8 +352,12 @@ impl Tracing {
         self.generations
     }
 
-    /// Traces a batch of at most so many samples and waits for it. How many there were, and how long they took.
+    /// Traces a batch of at most so many samples and waits for it. How many there were, and how long they took. While two modes
+    /// are compared the batch is of the one that has had less time.
     pub fn trace(&mut self, samples: u32) -> anyhow::Result<(u32, Duration)> {
+        if let Some(side) = self.beside.as_mut().filter(|side| side.traced() < self.traced) {
+            return side.trace(samples);
+        }
         let start = Instant::now();
         let traced = self.renderer()?.trace(samples)?;
         self.gpu.wait()?;
@@ -358,16 +377,15 @@ impl Tracing {
             self.target = Some(Target { texture, picture: Picture { texture: view, generation: self.generations } });
         }
         let picture = self.target.as_ref().context("made above")?.picture.clone();
+        let settings = view_settings(look, size);
+        self.find_first_hits(&settings)?;
         let mut encoder =
             self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("show") });
-        self.renderer()?.present(
-            &mut encoder,
-            &view_settings(look, size),
-            &picture.texture,
-            readback::PICTURE_FORMAT,
-        )?;
+        self.renderer()?.present(&mut encoder, &settings, &picture.texture, readback::PICTURE_FORMAT)?;
+        self.present_beside(&mut encoder, look, &settings, &picture)?;
         self.gpu.queue.submit([encoder.finish()]);
         self.gpu.wait()?;
+        self.look_at_picture(look, &settings)?;
         Ok(picture)
     }
 
@@ -376,6 +394,9 @@ impl Tracing {
         if let Some(Open { renderer: Some(renderer), .. }) = &mut self.open {
             renderer.restart();
             self.traced = Duration::ZERO;
+        }
+        if let Some(side) = &mut self.beside {
+            side.restart();
         }
     }
 
@@ -396,6 +417,7 @@ impl Tracing {
 
     /// What the film pixels about a direction say.
     pub fn block_at(&mut self, direction: Vec3) -> anyhow::Result<Block> {
+        self.read_beside(direction)?;
         Ok(Block::new(&self.renderer()?.pixels_near(direction, READOUT_RADIUS_PX)?))
     }
 
@@ -446,10 +468,7 @@ fn view_settings(look: &Look, size: [u32; 2]) -> ViewSettings {
         size,
         exposure_ev: look.controls.exposure_ev,
         tone_map: look.controls.tone_map.into(),
-        debug_view: match look.controls.shown {
-            Shown::Picture => DebugView::Beauty,
-            Shown::Density => DebugView::SampleDensity,
-        },
+        debug_view: look.controls.shown,
         fill: true,
         ring: None,
     }

@@ -10,16 +10,20 @@ use tracer::film::{FilmHeader, FilmMapping, FilmSnapshot};
 use tracer::scene::Scene;
 
 use super::attention_tools::{self, ToolState};
-use super::controls::{Controls, MODES, Shown};
+use super::compare;
+use super::controls::Controls;
+use super::eccentricity;
 use super::editor::{self, Editor};
 use super::engine::{Engine, Look, Message, Request, State, Survivors};
 use super::gaze::{self, Gaze, ScreenMapping, fovea_ring};
 use super::gaze_control::GazeControl;
 use super::gaze_panel;
+use super::legend;
 use super::navigation::Navigation;
 use super::open_scene::OpenScene;
 use super::overlay::{self, Action, Facts, Visibility};
 use super::screenshot::Screenshot;
+use super::seeing;
 use super::split_panel::{self, SplitTimes};
 use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
@@ -255,8 +259,11 @@ impl Window {
         if self.visibility.editor {
             self.show_editor(ctx);
         }
+        let offset = if self.visibility.editor { editor::panel::PANEL_WIDTH + 30.0 } else { 0.0 };
+        if state.headset.is_none() {
+            legend::draw(ctx, &self.controls, state.readout.seen.scale, offset);
+        }
         if self.visibility.gaze && !self.gaze.shows_dots() {
-            let offset = if self.visibility.editor { editor::panel::PANEL_WIDTH + 30.0 } else { 0.0 };
             gaze_panel::panel(ctx, &mut self.gaze, offset, Instant::now());
         }
         if self.visibility.keys {
@@ -336,7 +343,7 @@ impl Window {
             Action::EnterHeadset => self.engine.request(Request::EnterHeadset),
             Action::LeaveHeadset => self.engine.request(Request::LeaveHeadset),
             Action::Split(split_panel::Action::Show(mode)) => {
-                self.controls.mode = mode;
+                (self.controls.mode, self.controls.comparison) = (mode, None);
                 self.controls.paused = false;
                 self.engine.request(Request::Restart);
             }
@@ -395,6 +402,7 @@ impl Window {
                 editor.panel.gizmo = editor.panel.gizmo.next();
             }
         }
+        seeing::keys(ctx, &mut self.controls);
         let exr = pressed(Modifiers::COMMAND | Modifiers::SHIFT, Key::S);
         let png = pressed(Modifiers::COMMAND, Key::S);
         let plain = |key| pressed(Modifiers::NONE, key);
@@ -404,7 +412,10 @@ impl Window {
             self.controls.paused = !self.controls.paused;
         }
         if plain(Key::M) {
-            self.controls.mode = next_mode(self.controls.mode);
+            self.controls.mode = seeing::next_mode(self.controls.mode);
+        }
+        if pressed(Modifiers::SHIFT, Key::F) {
+            self.visibility.eccentricity = !self.visibility.eccentricity;
         }
         if plain(Key::F) {
             if in_headset {
@@ -415,10 +426,6 @@ impl Window {
         }
         if plain(Key::V) {
             self.act(if in_headset { Action::LeaveHeadset } else { Action::EnterHeadset });
-        }
-        if plain(Key::X) {
-            let density = self.controls.shown == Shown::Density;
-            self.controls.shown = if density { Shown::Picture } else { Shown::Density };
         }
         let stops = f32::from(u8::from(plain(Key::CloseBracket))) - f32::from(u8::from(plain(Key::OpenBracket)));
         self.controls.exposure_ev = (self.controls.exposure_ev + 0.5 * stops).clamp(-8.0, 8.0);
@@ -457,7 +464,7 @@ impl Window {
     fn follow_presses(&mut self, state: &State) {
         while self.mode_presses < state.mode_presses {
             self.mode_presses += 1;
-            self.controls.mode = next_mode(self.controls.mode);
+            self.controls.mode = seeing::next_mode(self.controls.mode);
         }
     }
 
@@ -485,6 +492,10 @@ impl eframe::App for Window {
         self.split_keys(&ctx, &state);
         self.keys(&ctx, state.headset.is_some());
         self.follow_presses(&state);
+        if state.headset.is_some() {
+            // Both eyes see one film, and it comes back as it is.
+            self.controls.comparison = None;
+        }
         if let (Some((_, navigation)), Some(editor)) = (&mut self.scene, &mut self.editor) {
             let attention = &mut self.controls.attention;
             let used = attention_tools::point(&response, &navigation.standpoint, self.tools, attention);
@@ -521,6 +532,13 @@ impl eframe::App for Window {
             // A headset's mirror has its own.
             if self.visibility.ring && self.controls.mode == Mode::Fv && state.headset.is_none() {
                 ui.painter().extend(fovea_ring(&look.mapping, rect, gaze));
+            }
+            if self.visibility.eccentricity && state.headset.is_none() {
+                let at = self.controls.eccentricity;
+                eccentricity::draw(ui.painter(), &look.mapping, &look.standpoint, rect, gaze, at);
+            }
+            if let Some(comparison) = self.controls.comparison.as_mut().filter(|_| state.headset.is_none()) {
+                compare::wipe(ui, rect, self.controls.mode, comparison, &state.readout);
             }
             if let Some(editor) = self.editor.as_mut().filter(|_| !self.gaze.shows_dots()) {
                 editor.draw(ui, rect, &look.standpoint);
@@ -562,9 +580,4 @@ fn looking_at(film: &FilmHeader, camera: &Viewpoint, aspect: f32) -> (Quat, f32)
             (film.pose.world_from_film, 2.0 * y.min(x / aspect.max(1e-3)).atan())
         }
     }
-}
-
-fn next_mode(mode: Mode) -> Mode {
-    let place = MODES.iter().position(|entry| entry.0 == mode).unwrap_or(0);
-    MODES[(place + 1) % MODES.len()].0
 }

@@ -249,15 +249,39 @@ shared! {
         exposure: f32,
         tone_map: u32,
         debug_view: u32,
-        debug_scale: f32,
         fill: u32,
-        stale_weight: f32,
+        debug_low: f32,
+        debug_high: f32,
         stale_from_world: Columns3,
         stale_half_extent: [f32; 2],
         stale_size: [u32; 2],
         gaze_in_view: [f32; 2],
         ring_tangent: f32,
+        stale_weight: f32,
+        is_debug_logarithmic: u32,
+        hit_rows: u32,
+        luminance_quanta: f32,
         pad_0: u32,
+    }
+
+    /// A band of rows of a view, through whose pixels rays go.
+    struct FirstHitParams {
+        world_from_view: Columns3,
+        half_extent: [f32; 2],
+        size: [u32; 2],
+        origin: [f32; 3],
+        first_row: u32,
+        end_row: u32,
+        kind: u32,
+        pad_0: [u32; 2],
+    }
+
+    /// What a ray through the centre of a view's pixel meets first.
+    struct FirstHit {
+        albedo: [f32; 3],
+        depth: f32,
+        normal: [f32; 3],
+        steps: u32,
     }
 
     /// One pass over a level of the panorama.

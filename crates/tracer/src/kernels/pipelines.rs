@@ -249,8 +249,8 @@ fn buffer_type(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
     wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None }
 }
 
-/// Pipelines by key. Each is made once.
-#[derive(Debug, Default)]
+/// Pipelines by key. Each is made once; clones share what was made until then.
+#[derive(Clone, Debug, Default)]
 pub struct PipelineCache(HashMap<(KernelKey, Option<wgpu::TextureFormat>), Arc<Pipeline>>);
 
 impl PipelineCache {

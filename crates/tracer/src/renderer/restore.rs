@@ -101,7 +101,8 @@ impl Renderer {
     }
 
     /// The linear radiance of the view that was presented last, row by row, with its size in pixels; empty before. The
-    /// fourth value of a pixel is the weight, in samples, that it was found with. Waits for the device.
+    /// fourth value of a pixel is the weight, in samples, that it was found with; in the debug view of what is stale it is the
+    /// share of the old picture. Waits for the device.
     ///
     /// # Errors
     /// When the device is lost.
