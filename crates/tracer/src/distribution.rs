@@ -17,6 +17,10 @@ use crate::{
 /// Candidates drawn before a clipped layer accepts one outside.
 const CLIP_TRIES: u32 = 16;
 
+/// Strata that make up a pixel where most samples fall: with one the gain in the fovea is two thirds of that with four or eight
+/// (docs/reports/sequence.md).
+const STRATA_OF_A_PIXEL: f64 = 4.0;
+
 /// A perspective view: where it looks and what its image plane spans.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
@@ -169,21 +173,20 @@ impl Distribution {
         &self.inverse
     }
 
-    /// Strata of the unit square, 2^x columns of 2^y, within which the kernels' further numbers are a sequence of their own:
-    /// as many as pixels like the one that gets most samples would be, so that such a pixel's samples come from a few
-    /// strata and are well spread among themselves.
+    /// Strata of the unit square, 2^x columns of 2^y, within which the kernels' further numbers are a sequence of their own. In a
+    /// film whose sides are powers of two they are its pixels. Elsewhere pixels cut through strata, and a part of a sequence is
+    /// not well spread: there a pixel that gets most samples consists of [`STRATA_OF_A_PIXEL`].
     pub(crate) fn stratum_bits(&self, film: &FilmOptions) -> [u32; 2] {
         let sum: f32 = self.layers.iter().map(|(weight, _)| weight).sum();
-        let densest = self.layers.iter().map(|(weight, layer)| {
-            let share = f64::from(weight / sum) * self.largest_share(layer, film);
-            (share, matches!(layer, Layer::Film))
+        let shares = self.layers.iter().map(|(weight, layer)| {
+            (f64::from(weight / sum) * self.largest_share(layer, film), matches!(layer, Layer::Film))
         });
-        let (share, is_film) = densest.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((1.0, false));
-        let bits = (-share.log2()).round().clamp(2.0, 30.0) as u32;
-        // Of the film as of its sides; of a disc about the gaze a column more or less does not matter.
-        let wider = if is_film { film.width.max(1).ilog2() as i32 - film.height.max(1).ilog2() as i32 } else { 0 };
-        let x = ((bits as i32 + wider + 1) / 2).clamp(1, bits as i32 - 1) as u32;
-        [x, bits - x]
+        let (share, is_film) = shares.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((1.0, false));
+        if is_film && film.width.is_power_of_two() && film.height.is_power_of_two() && film.pixels() > 2 {
+            return [film.width.ilog2().max(1), film.height.ilog2().max(1)];
+        }
+        let bits = (STRATA_OF_A_PIXEL / share).log2().round().clamp(2.0, 30.0) as u32;
+        [bits.div_ceil(2), bits / 2]
     }
 
     /// Share of a layer's samples that falls on the pixel which gets most of them.
