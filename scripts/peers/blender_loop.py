@@ -128,6 +128,7 @@ def main():
     report = {
         "blender": bpy.app.version_string,
         "cores": os.cpu_count(),
+        "load": os.getloadavg()[0],
         "median_s": statistics.median(took),
         "longest_s": max(took),
         "changes": changes,

@@ -3,6 +3,7 @@
 import json
 import pathlib
 import sys
+import textwrap
 
 HEAD = """# The window: what was measured
 
@@ -16,7 +17,8 @@ def load(folder, name):
 
 
 def provenance(figures):
-    return f"Machine: {figures['machine']}; adapter: {figures['adapter']}; commit {figures['commit']}."
+    words = f"Machine: {figures['machine']}; load {figures['load']}; adapter: {figures['adapter']}; commit {figures['commit']}."
+    return textwrap.fill(words, 130)
 
 
 def slider(figures):
@@ -48,7 +50,8 @@ def blender(figures):
 
 `scripts/window_report blender`. Blender {figures['blender']} (`bpy`) exports a scene of four objects, then changes the base colour of one
 material and exports again, while the window shows the file. From the file's last byte until the change is on screen: median
-{figures['median_s']:.3f} s, longest {figures['longest_s']:.3f} s; 0.12 s of that the file rests before it is read. {figures['cores']} cores.
+{figures['median_s']:.3f} s, longest {figures['longest_s']:.3f} s; 0.12 s of that the file rests before it is read.
+{figures['cores']} cores, load {figures['load']:.1f}.
 
 | change | file MB | s to the screen | preparing ms | bytes uploaded | MB on the device |
 |---|---|---|---|---|---|
@@ -99,7 +102,7 @@ def main():
 
 An engine with a document, without a window, on lavapipe, whose device memory is resident memory too. Edits: moves, colours, lights,
 hiding and showing, a clearcoat that comes and goes, and undo. Reloads: colours, places, and now and then an object more or less. Means
-over the last half of the tenth.
+over the twentieth of the steps after the first tenth, and over the last twentieth.
 """)
     if edits:
         parts.append(memory("edits", "each is on screen before the next;", edits))

@@ -143,11 +143,11 @@ impl Session {
     }
 }
 
-/// Does something so often and compares memory at the end of the first tenth with that at the end of the last; each is the
-/// mean over a twentieth of the steps, since what is about to be freed comes and goes.
+/// Does something so often and compares memory after the first tenth with that after the last; each is the mean over a
+/// twentieth of the steps, since what is about to be freed comes and goes.
 fn compare(what: &str, count: usize, session: &mut Session, mut step: impl FnMut(&mut Session, usize)) {
     let start = Instant::now();
-    let (first, last) = (count / 20..count / 10, count - count / 20..count);
+    let (first, last) = (count / 10..count * 3 / 20, count * 19 / 20..count);
     let mut sums = [[0.0; 2]; 2];
     for number in 0..count {
         step(session, number);

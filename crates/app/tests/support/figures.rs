@@ -11,6 +11,9 @@ pub fn keep(name: &str, adapter: &str, mut figures: Value) {
     for (name, value) in Provenance::without_gpu(adapter).fields() {
         figures[name] = value.into();
     }
+    // What the machine did beside: times count on a quiet one only.
+    let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
+    figures["load"] = load.split(' ').next().unwrap_or_default().into();
     let path = PathBuf::from(folder).join(format!("{name}.json"));
     std::fs::write(path, serde_json::to_string_pretty(&figures).unwrap() + "\n").unwrap();
 }

@@ -7,7 +7,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use serde_json::{Value, json};
 
 use crate::glb::{material, with_json};
-use crate::{Display, ONE_AT_A_TIME, redness, scratch};
+use crate::{Display, ONE_AT_A_TIME, over_green, redness, scratch};
 
 /// Where the vase is.
 const VASE: (u32, u32) = (330, 540);
@@ -19,6 +19,10 @@ fn room(red: u32, blue: u32) -> Vec<u8> {
         let color = json!([share(red), 0.02, share(blue), 1.0]);
         material(document, "glazed red")["pbrMetallicRoughness"]["baseColorFactor"] = color;
     })
+}
+
+fn is_blue(shown: &image::RgbImage) -> bool {
+    over_green(2, shown, VASE.0, VASE.1) > redness(shown, VASE.0, VASE.1)
 }
 
 fn unix_seconds() -> f64 {
@@ -58,7 +62,7 @@ fn an_export_with_one_material_changed_uploads_that_alone() {
     let took_s = number(&changed["on_screen_unix_s"]) - written.get();
     eprintln!("shown {took_s:.3} s after the file's last byte; {uploaded} of {whole} bytes uploaded");
     assert!(uploaded > 0.0 && uploaded < 40e3 && whole > 10e6, "{figures}");
-    assert!(redness(&shown, VASE.0, VASE.1) < 1.0, "the vase is still red: {figures}");
+    assert!(is_blue(&shown), "the vase is still red: {figures}");
 }
 
 /// How somebody may write a file.
@@ -92,7 +96,7 @@ fn a_file_that_is_rewritten_at_random_moments_never_breaks_the_window() {
         );
         return;
     };
-    let (count, seconds) = if std::env::var_os("FOVEA_LONG").is_some() { (1000, 260) } else { (60, 32) };
+    let (count, seconds) = if std::env::var_os("FOVEA_LONG").is_some() { (1000, 330) } else { (60, 32) };
     let folder = scratch("rewritten");
     let scene = folder.join("room.glb");
     std::fs::write(&scene, room(80, 10)).unwrap();
@@ -119,7 +123,7 @@ fn a_file_that_is_rewritten_at_random_moments_never_breaks_the_window() {
     });
     std::fs::remove_dir_all(folder).unwrap();
     assert_eq!(figures["broken"], Value::Null, "{figures}");
-    assert!(redness(&shown, VASE.0, VASE.1) < 1.0, "the last version is not shown: {figures}");
+    assert!(is_blue(&shown), "the last version is not shown: {figures}");
     let versions = figures["versions"].as_array().unwrap();
     let last = versions.last().unwrap();
     assert!(number(&last["on_screen_unix_s"]) > ended.get(), "{figures}");
@@ -130,5 +134,5 @@ fn a_file_that_is_rewritten_at_random_moments_never_breaks_the_window() {
     eprintln!("rewritten {count} times; {in_all} versions were shown");
     let adapter = figures["adapter"].as_str().unwrap();
     crate::figures::keep("rewrites", adapter, json!({ "rewritten": count, "shown": in_all }));
-    assert!(in_all >= 3.0, "{figures}");
+    assert!(in_all >= 2.0, "{figures}");
 }

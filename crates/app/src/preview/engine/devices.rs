@@ -45,6 +45,10 @@ impl Devices {
 
     /// Whether one of them is gone, and all that was on it.
     pub fn is_lost(&self) -> bool {
+        if self.are_two {
+            // A device tells of its loss when it is polled, which tracing does of its own alone.
+            let _ = self.window.device.poll(wgpu::PollType::Poll);
+        }
         self.window.is_lost() || self.tracing.is_lost()
     }
 }
