@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, anyhow};
 use egui_wgpu::{WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew};
-use tracer::gpu::{AdapterSelect, Gpu};
+use tracer::gpu::{self, AdapterSelect, Gpu};
 
 use crate::cli::PreviewArgs;
 use crate::commands::print_json;
@@ -17,7 +17,7 @@ use crate::output::exr;
 use crate::reload::Loader;
 use crate::reload::rule::Timing;
 use crate::session::{self, Source};
-use engine::{Engine, Request};
+use engine::{Devices, Engine, Request};
 use gaze_control::GazeControl;
 use screenshot::{Outcome, Screenshot};
 use window::Window;
@@ -28,6 +28,7 @@ pub mod controls;
 pub mod eccentricity;
 pub mod editor;
 pub mod engine;
+pub mod frame_times;
 pub mod gaze;
 pub mod gaze_control;
 pub mod gaze_panel;
@@ -43,6 +44,7 @@ pub mod seeing;
 pub mod split_panel;
 pub mod theme;
 pub mod tracing;
+pub mod versions;
 pub mod window;
 
 /// Opens the window and stays until it is closed.
@@ -90,7 +92,7 @@ pub fn run(args: &PreviewArgs) -> anyhow::Result<()> {
             let gpu = Gpu::adopt(state.adapter.clone(), state.device.clone(), state.queue.clone())?;
             let adapter = gpu.info().name.clone();
             let repaints = repaint.clone();
-            let engine = Engine::start(gpu, args, Arc::clone(&gaze), move || repaints.request())?;
+            let engine = Engine::start(Devices::beside(gpu), args, Arc::clone(&gaze), move || repaints.request())?;
             match (&mut *shown.borrow_mut(), first) {
                 (Some(window), _) => Window::renew(window, engine, adapter),
                 (none, Some(first)) => *none = Some(first(engine, adapter)?),
@@ -220,7 +222,13 @@ fn setup(select: AdapterSelect) -> WgpuSetup {
     }));
     setup.device_descriptor = Arc::new(|adapter| {
         let (required_features, required_limits) = Gpu::requirements(adapter);
-        wgpu::DeviceDescriptor { label: Some("fovea"), required_features, required_limits, ..Default::default() }
+        wgpu::DeviceDescriptor {
+            label: Some("fovea"),
+            required_features,
+            required_limits,
+            memory_hints: gpu::MEMORY,
+            ..Default::default()
+        }
     });
     WgpuSetup::CreateNew(setup)
 }

@@ -115,8 +115,9 @@ pub fn read_texture(gpu: &Gpu, texture: &wgpu::Texture) -> anyhow::Result<Vec<[u
     gpu.wait()?;
     receiver.recv().context("the graphics device was lost")?.context("the picture could not be read back")?;
     let mapped = staging.slice(..).get_mapped_range().context("the picture could not be read back")?;
-    let rows = mapped.chunks_exact(padded as usize);
-    Ok(rows
-        .flat_map(|row| row[..row_bytes as usize].chunks_exact(4).map(|t| [t[0], t[1], t[2], t[3]]).collect::<Vec<_>>())
-        .collect())
+    let mut texels = Vec::with_capacity(texture.width() as usize * texture.height() as usize);
+    for row in mapped.chunks_exact(padded as usize) {
+        texels.extend_from_slice(row[..row_bytes as usize].as_chunks().0);
+    }
+    Ok(texels)
 }

@@ -66,12 +66,7 @@ fn whole(renderer: &mut Renderer, look: &Look) -> Vec<[u8; 4]> {
 
 fn shown(tracing: &mut Tracing, look: &Look) -> Vec<[u8; 4]> {
     tracing.show(look, 1).unwrap();
-    let path =
-        std::env::temp_dir().join(format!("fovea-seeing-{}-{:?}.png", std::process::id(), std::thread::current().id()));
-    tracing.save_png(&path).unwrap();
-    let picture = image::open(&path).unwrap().to_rgba8();
-    std::fs::remove_file(path).unwrap();
-    picture.pixels().map(|pixel| pixel.0).collect()
+    tracing.texels().unwrap().1
 }
 
 /// Traces for so long and returns the time of both films.

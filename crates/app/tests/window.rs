@@ -12,6 +12,15 @@ use std::time::{Duration, Instant};
 use image::RgbImage;
 use serde_json::Value;
 
+#[path = "window/exports.rs"]
+mod exports;
+#[path = "support/figures.rs"]
+mod figures;
+#[path = "support/glb.rs"]
+mod glb;
+#[path = "window/slider.rs"]
+mod slider;
+
 /// Two windows on one CPU adapter would measure each other.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
@@ -41,6 +50,15 @@ impl Display {
     fn xdotool(&self, arguments: &str) -> String {
         let output = Command::new("xdotool").env("DISPLAY", &self.name).args(arguments.split(' ')).output().unwrap();
         String::from_utf8(output.stdout).unwrap().trim().to_owned()
+    }
+
+    /// Waits until a window has this in its title: its scene is open.
+    fn wait_for_title(&self, title: &str) {
+        let start = Instant::now();
+        while self.xdotool(&format!("search --name {title}")).is_empty() {
+            assert!(start.elapsed() < Duration::from_secs(120), "the scene does not open");
+            std::thread::sleep(Duration::from_millis(200));
+        }
     }
 
     /// Opens the built-in scene, does `actions` once there is a window, and returns what the window showed and said.
@@ -91,6 +109,14 @@ impl Drop for Display {
         let _ = self.server.kill();
         let _ = self.server.wait();
     }
+}
+
+/// An empty folder of this test.
+fn scratch(name: &str) -> std::path::PathBuf {
+    let folder = std::env::temp_dir().join(format!("fovea-window-{name}-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
 }
 
 /// Mean of all channels in a square of 81 pixels a side.
@@ -219,11 +245,16 @@ fn a_window_goes_on_with_a_film_and_shows_it_to_a_viewer() {
     assert!(received.len() > 1280 * 720 * 12, "{} bytes", received.len());
 }
 
-/// Mean red over mean green in a square of 31 pixels a side.
-fn redness(picture: &RgbImage, x: u32, y: u32) -> f64 {
+/// Mean of a channel over mean green in a square of 31 pixels a side.
+fn over_green(channel: usize, picture: &RgbImage, x: u32, y: u32) -> f64 {
     let square = || (x - 15..=x + 15).flat_map(|x| (y - 15..=y + 15).map(move |y| picture.get_pixel(x, y).0));
     let mean = |channel: usize| square().map(|pixel| f64::from(pixel[channel])).sum::<f64>();
-    mean(0) / mean(1).max(1.0)
+    mean(channel) / mean(1).max(1.0)
+}
+
+/// Mean red over mean green.
+fn redness(picture: &RgbImage, x: u32, y: u32) -> f64 {
+    over_green(0, picture, x, y)
 }
 
 #[test]
@@ -234,9 +265,7 @@ fn an_object_is_picked_moved_undone_and_saved_and_its_file_broken_and_mended() {
         eprintln!("SKIP {NAME}: Xvfb or xdotool is missing");
         return;
     };
-    let folder = std::env::temp_dir().join(format!("fovea-window-scene-{}", std::process::id()));
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).unwrap();
+    let folder = scratch("scene");
     let (scene, sidecar) = (folder.join("room.glb"), folder.join("room.glb.fovea.json"));
     std::fs::write(&scene, tracer::builtin::BYTES).unwrap();
     let wait = |seconds: f64| std::thread::sleep(Duration::from_secs_f64(seconds));
@@ -244,19 +273,17 @@ fn an_object_is_picked_moved_undone_and_saved_and_its_file_broken_and_mended() {
 
     // Few bounces and plain colours: much is to be seen after few samples.
     let options = [scene.to_str().unwrap(), "--max-bounces", "1", "--tonemap", "linear"];
-    // The red vase, its handle along X, its material's second slider.
+    // The red vase, its handle along X, its material in the panel, that one's colour, blue in the colour's window, and a
+    // place of the panel where there is nothing to press.
     let (vase, handle, moved_to) = ((340, 560), (400, 533), (460, 533));
-    let (shown, figures) = display.session(45, &options, |display| {
+    let (material, colour, blue, nothing) = ((1080, 513), (1119, 422), (1040, 396), (1200, 380));
+    let (shown, figures) = display.session(50, &options, |display| {
         let click = |(x, y): (u32, u32)| display.xdotool(&format!("mousemove {x} {y} sleep 0.8 click 1 sleep 1.2"));
-        // A slider misses a press and release within one frame, and frames are long on a CPU.
+        // A press and release within one frame are missed, and frames are long on a CPU.
         let press = |(x, y): (u32, u32)| {
             display.xdotool(&format!("mousemove {x} {y} sleep 0.8 mousedown 1 sleep 1.0 mouseup 1 sleep 1.0"))
         };
-        let start = Instant::now();
-        while display.xdotool("search --name room.glb").is_empty() {
-            assert!(start.elapsed() < Duration::from_secs(120), "the scene does not open");
-            wait(0.2);
-        }
+        display.wait_for_title("room.glb");
         wait(1.5);
         click(vase);
         display.xdotool("key n sleep 1.2");
@@ -268,14 +295,16 @@ fn an_object_is_picked_moved_undone_and_saved_and_its_file_broken_and_mended() {
         display.xdotool("mouseup 1 sleep 1.0");
         // On a busy machine a press may fall between two frames; pressing twice changes nothing more.
         for attempt in 1.. {
-            click((1080, 513));
-            press((1150, 445));
+            click(material);
+            click(colour);
+            press(blue);
+            click(nothing);
             display.xdotool("key ctrl+e");
             wait(2.0);
             if sidecar.exists() && saved()["materials"].as_array().is_some_and(|materials| materials.len() == 1) {
                 break;
             }
-            assert!(attempt < 4, "the slider does not set the material");
+            assert!(attempt < 4, "the colour does not change");
         }
         display.xdotool("key ctrl+z sleep 0.8 key ctrl+shift+z sleep 0.8 key ctrl+e sleep 2.0");
         let edits = saved();
@@ -285,7 +314,8 @@ fn an_object_is_picked_moved_undone_and_saved_and_its_file_broken_and_mended() {
             (Some("vase"), 1)
         );
         assert!((0.1..0.4).contains(&moved), "{edits}");
-        assert!(edits["materials"][0]["metallic"].as_f64().unwrap() > 0.2, "{edits}");
+        let [red, blue] = [0, 2].map(|channel: usize| edits["materials"][0]["base_color"][channel].as_f64().unwrap());
+        assert!(red < 0.1 && blue > 0.4, "{edits}");
         display.xdotool("key ctrl+z sleep 0.8 key ctrl+z sleep 0.8");
         std::fs::write(&scene, &tracer::builtin::BYTES[..tracer::builtin::BYTES.len() / 2]).unwrap();
         display.xdotool("mousemove 340 540");
@@ -299,18 +329,30 @@ fn an_object_is_picked_moved_undone_and_saved_and_its_file_broken_and_mended() {
     let [at_first, moved] = red(&shown);
     assert!(at_first > 1.1 * moved, "{at_first} {moved}");
 
-    // Opened again, the edits are there, and they outlive a file that is broken and mended meanwhile.
+    // Opened again, the edits are there, and they outlive a file that is broken and then replaced by one with green walls.
     std::fs::write(&scene, tracer::builtin::BYTES).unwrap();
-    let (shown, figures) = display.session(12, &options, |display| {
-        display.xdotool("mousemove 360 540");
+    let green = glb::with_json(tracer::builtin::BYTES, |document| {
+        let walls = glb::material(document, "plaster");
+        walls["pbrMetallicRoughness"]["baseColorFactor"] = serde_json::json!([0.1, 0.6, 0.1, 1.0]);
+    });
+    let wall = (500, 500);
+    assert!(redness(&shown, wall.0, wall.1) > 0.8, "the wall is grey at first");
+    let (shown, figures) = display.session(16, &options, |display| {
+        display.wait_for_title("room.glb");
+        display.xdotool("mousemove 410 540");
         wait(3.0);
         std::fs::write(&scene, b"glTF").unwrap();
         wait(1.5);
-        std::fs::write(&scene, tracer::builtin::BYTES).unwrap();
+        std::fs::write(&scene, &green).unwrap();
     });
     assert_eq!(figures["broken"], Value::Null, "{figures}");
     assert!(figures["editor"]["message"].as_str().unwrap_or_default().contains("read again"), "{figures}");
-    let [at_first, moved] = red(&shown);
-    assert!(moved > 1.1 * at_first, "{at_first} {moved}");
+    let [at_first, moved] = [330, 410].map(|x| over_green(2, &shown, x, 540));
+    assert!(moved > 1.2 * at_first, "no blue vase where it was moved to: {at_first} {moved}");
+    let walls = redness(&shown, wall.0, wall.1);
+    assert!(walls < 0.7, "the walls are not green: {walls}");
+    if let Some(folder) = std::env::var_os("FOVEA_SHOTS") {
+        shown.save(std::path::Path::new(&folder).join("replaced.png")).unwrap();
+    }
     std::fs::remove_dir_all(folder).unwrap();
 }

@@ -86,6 +86,10 @@ const STORAGE_BUFFERS: u32 = 9;
 /// Smallest storage binding that the tracer works with: wgpu's default.
 const SMALLEST_BINDING: u64 = 128 << 20;
 
+/// How a device should allocate: in small blocks, which go back to the system when they are empty. Scenes come and go, little is
+/// allocated for a frame, and on a CPU adapter all of it is the machine's own memory.
+pub const MEMORY: wgpu::MemoryHints = wgpu::MemoryHints::MemoryUsage;
+
 impl Gpu {
     /// Opens a device without a window.
     ///
@@ -100,6 +104,7 @@ impl Gpu {
             label: Some("fovea"),
             required_features,
             required_limits,
+            memory_hints: MEMORY,
             ..Default::default()
         }))
         .map_err(|error| GpuError::Device { adapter: info.name.clone(), cause: error.to_string() })?;

@@ -3,16 +3,14 @@
 //! The window says what it wants to see ([`Engine::look`], the last word counts) and asks for things to be done
 //! ([`Engine::request`], in order). The thread answers with a [`State`] and asks the window to repaint.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, TryRecvError};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use anyhow::Context;
 use glam::{UVec2, Vec2};
 use tracer::film::FilmSnapshot;
-use tracer::gpu::Gpu;
 use tracer::scene::Scene;
 
 use super::attention_tools;
@@ -26,8 +24,6 @@ use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
 use crate::convergence::{Convergence, Follower};
 use crate::gaze::hub::{GazeHub, SampleTimes};
-use crate::output::{exr, png};
-use crate::readback;
 use crate::session::one_line;
 use crate::tev::TevLink;
 
@@ -37,11 +33,16 @@ mod headset;
 #[path = "engine/no_headset.rs"]
 mod headset;
 
+mod devices;
+mod priority;
 mod rate;
 mod readout;
+mod saving;
 
+pub use devices::Devices;
+use devices::Screen;
 use rate::Rate;
-pub use readout::{HeadsetReadout, Message};
+pub use readout::{HeadsetReadout, Message, ShownVersion};
 
 /// How long a thread with nothing to trace sleeps between looks at what the window wants.
 const IDLE: Duration = Duration::from_millis(50);
@@ -124,6 +125,8 @@ pub struct State {
     pub headset: Option<HeadsetReadout>,
     /// How often the next mode was asked for in the headset.
     pub mode_presses: u64,
+    /// The version of the scene that the picture shows.
+    pub version: ShownVersion,
     /// The thread has stopped for good, by a panic; standard error has the reason.
     pub dead: bool,
 }
@@ -150,7 +153,7 @@ pub struct Survivors {
 /// Handle of the thread; dropping it stops the thread.
 pub struct Engine {
     shared: Arc<Shared>,
-    gpu: Gpu,
+    devices: Devices,
     requests: Option<Sender<Request>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -161,27 +164,28 @@ impl Engine {
     /// # Errors
     /// When the system gives no thread.
     pub fn start(
-        gpu: Gpu,
+        devices: impl Into<Devices>,
         args: &PreviewArgs,
         gaze: Arc<GazeHub>,
         repaint: impl Fn() + Send + 'static,
     ) -> std::io::Result<Self> {
+        let devices = devices.into();
         let shared = Arc::new(Shared::default());
         let tev = args.tev.clone().map(|address| {
             let tells = Arc::clone(&shared);
             TevLink::start(address, "fovea", move |line| lock(&tells.state).message = Some(Message::now(line, false)))
         });
         let (requests, inbox) = mpsc::channel();
-        let device = gpu.clone();
         let worker = Worker {
             shared: Arc::clone(&shared),
             inbox,
-            pacing: Pacing::new(gpu.is_software()),
-            gpu: gpu.clone(),
+            pacing: Pacing::new(devices.tracing.is_software()),
+            screen: Screen::new(devices.window.clone()),
             headset: None,
             untold: None,
-            mirror: None,
-            tracing: Tracing::new(gpu, args.clone()),
+            tracing: Tracing::new(devices.tracing.clone(), args.clone()),
+            devices: devices.clone(),
+            versions: 0,
             gaze,
             sample: None,
             repaint: Box::new(repaint),
@@ -200,7 +204,7 @@ impl Engine {
             tev: tev.transpose()?,
         };
         let thread = std::thread::Builder::new().name("engine".into()).spawn(move || worker.run())?;
-        Ok(Self { shared, gpu: device, requests: Some(requests), thread: Some(thread) })
+        Ok(Self { shared, devices, requests: Some(requests), thread: Some(thread) })
     }
 
     /// Says what the window shows.
@@ -231,7 +235,7 @@ impl Engine {
     /// What the thread is up to.
     pub fn state(&self) -> State {
         let mut state = lock(&self.shared.state).clone();
-        state.lost = self.gpu.is_lost();
+        state.lost = self.devices.is_lost();
         state.dead |= self.thread.as_ref().is_none_or(JoinHandle::is_finished);
         state
     }
@@ -255,14 +259,15 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 struct Worker {
     shared: Arc<Shared>,
     inbox: Receiver<Request>,
-    /// The window's device.
-    gpu: Gpu,
+    /// Those of the window; a headset has its own.
+    devices: Devices,
+    screen: Screen,
     headset: Option<headset::HeadsetRun>,
     /// What went wrong before there was a picture.
     untold: Option<String>,
-    /// The headset's mirror on the window's device.
-    mirror: Option<(wgpu::Texture, Picture)>,
     tracing: Tracing,
+    /// Versions of the scene that were prepared.
+    versions: u64,
     gaze: Arc<GazeHub>,
     /// The gaze sample that the last batch went by.
     sample: Option<SampleTimes>,
@@ -292,6 +297,9 @@ struct Worker {
 impl Worker {
     /// Until the window closes.
     fn run(mut self) {
+        if self.devices.are_two() {
+            priority::give_way();
+        }
         loop {
             match self.next_request() {
                 Ok(Some(request)) => self.carry_out(request),
@@ -397,7 +405,11 @@ impl Worker {
     fn show(&mut self, look: &Look) -> anyhow::Result<()> {
         let start = Instant::now();
         let coarseness = self.coarseness();
-        let picture = self.tracing.show(look, coarseness)?;
+        let mut picture = self.tracing.show(look, coarseness)?;
+        if self.devices.are_two() {
+            let (size, texels) = self.tracing.texels()?;
+            picture = self.screen.show(size, &texels, || self.tracing.next_generation())?;
+        }
         if coarseness == 1 {
             self.show_time = start.elapsed();
         }
@@ -412,8 +424,10 @@ impl Worker {
             self.read_at = Some(Instant::now());
         }
         let (readout, film) = (self.readout(), self.film_words());
+        let version = self.tracing.scene_report().map(|(report, took)| ShownVersion::new(self.versions, report, took));
         let mut state = lock(&self.shared.state);
         state.picture = Some(picture);
+        state.version = version.unwrap_or_default();
         state.readout = readout;
         state.film = film;
         state.mode = Some(look.controls.mode);
@@ -503,32 +517,6 @@ impl Worker {
         }
     }
 
-    /// The picture as it is shown: the headset's mirror while there is one.
-    fn save_png(&mut self, path: &Path) -> anyhow::Result<()> {
-        match (&self.headset, &self.mirror) {
-            (Some(_), Some((texture, _))) => {
-                let texels = readback::read_texture(&self.gpu, texture)?;
-                Ok(png::write(path, texture.width(), texture.height(), &texels)?)
-            }
-            _ => self.tracing.save_png(path),
-        }
-    }
-
-    /// Reads the film back here and writes the file elsewhere: compressing a large film takes seconds.
-    fn save_exr(&mut self, path: PathBuf) -> anyhow::Result<Option<String>> {
-        let look = lock(&self.shared.look).clone().context("there is no picture yet")?;
-        let film = self.tracing.film(&look)?;
-        let shared = Arc::clone(&self.shared);
-        std::thread::Builder::new().name("save".into()).spawn(move || {
-            let message = match exr::write(&path, &film) {
-                Ok(()) => Message::now(format!("saved {}", path.display()), false),
-                Err(error) => Message::now(error.to_string(), true),
-            };
-            lock(&shared.state).message = Some(message);
-        })?;
-        Ok(None)
-    }
-
     /// Puts the newest version of the scene in the place of the last.
     fn take_version(&mut self) {
         let Some(version) = lock(&self.shared.version).take() else { return };
@@ -540,6 +528,7 @@ impl Worker {
         self.pacing.restart();
         self.rate = Rate::default();
         let result = result.and_then(|()| {
+            self.versions += 1;
             self.shown = None;
             self.awaits_scene.take().map_or(Ok(()), |film| self.go_on(film))
         });

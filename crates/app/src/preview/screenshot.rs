@@ -9,11 +9,15 @@ use egui::{ColorImage, Context, ViewportCommand};
 use serde_json::{Value, json};
 
 use super::engine::{Message, State};
+use super::frame_times::FrameTimes;
 use crate::output::png;
 use crate::settings::mode_name;
 
 /// How often the clock is looked at; every frame costs a CPU adapter time that it does not trace.
 const LOOK_INTERVAL: Duration = Duration::from_millis(250);
+
+/// While a button is held: that somebody moves the pointer slowly is not the window's fault.
+const HELD_INTERVAL: Duration = Duration::from_millis(10);
 
 /// Where the outcome of a screenshot is left for whoever opened the window.
 pub type Outcome = Arc<Mutex<Option<anyhow::Result<Value>>>>;
@@ -29,10 +33,8 @@ pub struct Screenshot {
     /// spent tracing until then.
     halfway: Option<(Instant, Duration)>,
     asked: bool,
-    /// Frames drawn since then, when the last one was, and the longest time between two.
-    frames: u32,
-    last_frame: Option<Instant>,
-    longest_frame: Duration,
+    /// Since then.
+    frames: FrameTimes,
     sender: Sender<Arc<ColorImage>>,
     receiver: Receiver<Arc<ColorImage>>,
 }
@@ -49,9 +51,7 @@ impl Screenshot {
             since: None,
             halfway: None,
             asked: false,
-            frames: 0,
-            last_frame: None,
-            longest_frame: Duration::ZERO,
+            frames: FrameTimes::default(),
             sender,
             receiver,
         }
@@ -85,9 +85,11 @@ impl Screenshot {
         if since.elapsed() >= self.after / 2 {
             let _ = self.halfway.get_or_insert((now, state.readout.traced));
         }
-        self.frames += 1;
-        self.longest_frame = self.longest_frame.max(self.last_frame.map_or(Duration::ZERO, |last| now - last));
-        self.last_frame = Some(now);
+        let held = ctx.input(|input| input.pointer.any_down());
+        self.frames.frame(now, held);
+        if held {
+            ctx.request_repaint_after(HELD_INTERVAL);
+        }
         if !self.asked && since.elapsed() >= self.after {
             self.asked = true;
             let (sender, ctx_of_reply) = (self.sender.clone(), ctx.clone());
@@ -118,8 +120,7 @@ impl Screenshot {
             "elapsed_s": readout.elapsed.as_secs_f64(),
             "tracing_share": tracing / (now - halfway).as_secs_f64().max(1e-9),
             "shown_s": self.since.map_or(0.0, |since| (now - since).as_secs_f64()),
-            "frames": self.frames,
-            "longest_frame_ms": self.longest_frame.as_secs_f64() * 1e3,
+            "frames": self.frames.figures(),
             "film": state.film,
             "mode": state.mode.map(mode_name),
             "headset": state.headset.as_ref().map(|headset| json!({

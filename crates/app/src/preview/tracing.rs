@@ -1,6 +1,5 @@
 //! What the engine's thread does with the renderer.
 
-use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -10,7 +9,7 @@ use glam::{UVec2, Vec2, Vec3};
 use tracer::distribution::{Distribution, View as TracerView};
 use tracer::film::{FilmMapping, FilmSnapshot};
 use tracer::gpu::Gpu;
-use tracer::renderer::{FilmPose, Renderer, RendererOptions};
+use tracer::renderer::{FilmPose, RenderError, Renderer, RendererOptions, SceneReport};
 use tracer::scene::Scene;
 use tracer::view::{ViewProjection, ViewSettings};
 
@@ -21,7 +20,6 @@ use crate::cli::choices::{EccentricityAt, Mode};
 use crate::convergence::Block;
 use crate::film::FilmPlan;
 use crate::output::exr::FilmFile;
-use crate::output::png;
 use crate::readback;
 use crate::sampling::{Acuity, Aim, GazePoint};
 use crate::settings::RunSettings;
@@ -88,6 +86,8 @@ pub struct Tracing {
     /// The other film of a comparison.
     beside: Option<Side>,
     seeing: Seeing,
+    /// What the last version of the scene took, and how long altogether.
+    scene_report: Option<(SceneReport, Duration)>,
 }
 
 impl Tracing {
@@ -108,6 +108,7 @@ impl Tracing {
             keeps_film: false,
             beside: None,
             seeing: Seeing::default(),
+            scene_report: None,
         }
     }
 
@@ -125,7 +126,7 @@ impl Tracing {
     pub fn set_scene(&mut self, scene: Arc<Scene>) -> anyhow::Result<()> {
         match &mut self.open {
             Some(Open { renderer: Some(renderer), scene: shown, .. }) => {
-                renderer.set_scene(&scene)?;
+                self.scene_report = Some(timed_set_scene(renderer, &scene)?);
                 *shown = scene;
                 if let Some(side) = &mut self.beside {
                     side.follow_scene(renderer)?;
@@ -144,7 +145,7 @@ impl Tracing {
         let open = self.open.as_mut().context("no scene is open")?;
         let everywhere = Distribution::omnidirectional(inverse);
         let mut renderer = Renderer::new(&self.gpu, &film.header.renderer_options(), everywhere)?;
-        renderer.set_scene(&open.scene)?;
+        self.scene_report = Some(timed_set_scene(&mut renderer, &open.scene)?);
         renderer.set_pose(film.header.pose);
         renderer.restore(film)?;
         let world_from_film = film.header.pose.world_from_film;
@@ -236,7 +237,7 @@ impl Tracing {
                     sequence: self.args.sampling.sequence.into(),
                 };
                 let mut renderer = Renderer::new(&self.gpu, &options, distribution)?;
-                renderer.set_scene(&open.scene)?;
+                self.scene_report = Some(timed_set_scene(&mut renderer, &open.scene)?);
                 open.renderer = Some(renderer);
             }
         }
@@ -421,12 +422,15 @@ impl Tracing {
         Ok(Block::new(&self.renderer()?.pixels_near(direction, READOUT_RADIUS_PX)?))
     }
 
-    /// Writes the picture as it is shown.
-    pub fn save_png(&mut self, path: &Path) -> anyhow::Result<()> {
-        let target = self.target.as_ref().context("there is no picture yet")?;
-        let texels = readback::read_texture(&self.gpu, &target.texture)?;
-        png::write(path, target.texture.width(), target.texture.height(), &texels)?;
-        Ok(())
+    /// The picture as it is shown: its size and texels. Waits for the device.
+    pub fn texels(&self) -> anyhow::Result<([u32; 2], Vec<[u8; 4]>)> {
+        let texture = &self.target.as_ref().context("there is no picture yet")?.texture;
+        Ok(([texture.width(), texture.height()], readback::read_texture(&self.gpu, texture)?))
+    }
+
+    /// What the version of the scene that is traced took to prepare, and how long that was altogether.
+    pub fn scene_report(&self) -> Option<(&SceneReport, Duration)> {
+        self.scene_report.as_ref().map(|(report, took)| (report, *took))
     }
 
     /// The film as a value.
@@ -444,6 +448,11 @@ impl Tracing {
     pub fn renderer(&mut self) -> anyhow::Result<&mut Renderer> {
         self.open.as_mut().and_then(|open| open.renderer.as_mut()).context("no scene is open")
     }
+}
+
+fn timed_set_scene(renderer: &mut Renderer, scene: &Scene) -> Result<(SceneReport, Duration), RenderError> {
+    let start = Instant::now();
+    Ok((renderer.set_scene(scene)?, start.elapsed()))
 }
 
 impl Aim {

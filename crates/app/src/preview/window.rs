@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use egui::{Color32, Context, Key, Modifiers, Rect, Sense, Ui};
 use glam::{Quat, UVec2, Vec2, Vec3};
@@ -25,6 +25,7 @@ use super::overlay::{self, Action, Facts, Visibility};
 use super::screenshot::Screenshot;
 use super::seeing;
 use super::split_panel::{self, SplitTimes};
+use super::versions::Versions;
 use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
 use crate::cli::values::CameraChoice;
@@ -72,6 +73,7 @@ pub struct Window {
     resumed: Option<Arc<FilmSnapshot>>,
     /// Presses of the headset's mode button that have been followed.
     mode_presses: u64,
+    versions: Versions,
 }
 
 impl Window {
@@ -106,6 +108,7 @@ impl Window {
             screenshot,
             resumed: None,
             mode_presses: 0,
+            versions: Versions::default(),
         }
     }
 
@@ -129,6 +132,7 @@ impl Window {
             engine.request(Request::GoOn(film));
         }
         (self.engine, self.adapter, self.texture, self.mode_presses) = (engine, adapter, None, 0);
+        self.versions = Versions::default();
         self.note =
             Some(Message::now("the graphics device was lost; the film goes on from its last snapshot".into(), false));
     }
@@ -555,15 +559,21 @@ impl eframe::App for Window {
         self.hand_over();
         self.gaze.remember_screen(&self.controls, now);
         self.open_dropped_file(&ctx);
+        if self.versions.frame(SystemTime::now(), state.version) {
+            ctx.request_repaint();
+        }
         if let Some(screenshot) = &mut self.screenshot {
             let trouble = self.note.as_ref().filter(|note| note.wrong && self.loader.loading().is_none());
             let editor = self.editor.as_ref();
-            screenshot.update(
-                &ctx,
-                &state,
-                trouble,
-                || serde_json::json!({ "gaze": self.gaze.figures(now), "editor": editor.map(Editor::figures), "broken": self.broken }),
-            );
+            screenshot.update(&ctx, &state, trouble, || {
+                serde_json::json!({
+                    "gaze": self.gaze.figures(now),
+                    "editor": editor.map(Editor::figures),
+                    "broken": self.broken,
+                    "versions": self.versions.figures(),
+                    "adapter": self.adapter,
+                })
+            });
         }
     }
 

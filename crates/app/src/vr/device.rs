@@ -110,7 +110,7 @@ pub fn open(runtime: &Runtime) -> Result<HeadsetDevice, VrError> {
     // family; wgpu owns it from now on.
     let opened = unsafe {
         let device = ash::Device::load(hal_adapter.shared_instance().raw_instance().fp_v1_0(), raw_device);
-        let hints = wgpu::MemoryHints::default();
+        let hints = tracer::gpu::MEMORY;
         hal_adapter.device_from_raw(device, None, &extensions, features, &limits, &hints, family, 0)
     }
     .map_err(failed)?;

@@ -249,9 +249,19 @@ fn buffer_type(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
     wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None }
 }
 
-/// Pipelines by key. Each is made once; clones share what was made until then.
+/// Pipelines that are kept at most. A scene needs about ten; versions of one that add features or move parts need others.
+const MOST_KEPT: usize = 48;
+
+type CacheKey = (KernelKey, Option<wgpu::TextureFormat>);
+
+/// Pipelines by key; clones share what was made until then. Those that were not asked for longest are forgotten, and made again if
+/// they are needed.
 #[derive(Clone, Debug, Default)]
-pub struct PipelineCache(HashMap<(KernelKey, Option<wgpu::TextureFormat>), Arc<Pipeline>>);
+pub struct PipelineCache {
+    known: HashMap<CacheKey, (Arc<Pipeline>, u64)>,
+    /// Counts what was asked for.
+    asked: u64,
+}
 
 impl PipelineCache {
     /// The pipeline of a compute kernel.
@@ -281,11 +291,19 @@ impl PipelineCache {
         key: &KernelKey,
         target: Option<wgpu::TextureFormat>,
     ) -> Result<Arc<Pipeline>, KernelError> {
-        if let Some(pipeline) = self.0.get(&(key.clone(), target)) {
+        self.asked += 1;
+        let key = (key.clone(), target);
+        if let Some((pipeline, last)) = self.known.get_mut(&key) {
+            *last = self.asked;
             return Ok(pipeline.clone());
         }
-        let pipeline = Arc::new(Pipeline::create(device, key, target)?);
-        self.0.insert((key.clone(), target), pipeline.clone());
+        let pipeline = Arc::new(Pipeline::create(device, &key.0, target)?);
+        if self.known.len() >= MOST_KEPT
+            && let Some(oldest) = self.known.iter().min_by_key(|(_, (_, last))| *last).map(|(key, _)| key.clone())
+        {
+            self.known.remove(&oldest);
+        }
+        self.known.insert(key, (pipeline.clone(), self.asked));
         Ok(pipeline)
     }
 }

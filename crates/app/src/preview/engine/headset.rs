@@ -10,7 +10,7 @@ use tracer::gpu::Gpu;
 use tracer::panorama::{EyeSettings, Frustum, Panorama};
 
 use super::super::tracing::{HeadAim, Tracing};
-use super::{HeadsetReadout, Look, Picture, Request, Worker, lock};
+use super::{HeadsetReadout, Look, Request, Worker, lock};
 use crate::readback;
 use crate::screen::FOVEA_DEG;
 use crate::view::View;
@@ -121,11 +121,11 @@ impl Worker {
         let Some(run) = self.headset.take() else { return Ok(()) };
         self.busy(Some("moving the scene to the window's device".into()));
         let kept = lock(&self.shared.survivors).film.clone();
-        let moved = self.tracing.move_to(self.gpu.clone(), kept);
+        let moved = self.tracing.move_to(self.devices.tracing.clone(), kept);
         match &moved {
             Ok(moved) => lock(&self.shared.survivors).film.clone_from(&moved.film),
-            // Whatever went wrong, the window needs a film on its own device.
-            Err(_) => self.tracing.start_anew_on(self.gpu.clone()),
+            // Whatever went wrong, the window needs a film.
+            Err(_) => self.tracing.start_anew_on(self.devices.tracing.clone()),
         }
         // Not before the film has left its device.
         drop(run);
@@ -221,7 +221,7 @@ impl Worker {
         let texture = run.draw_mirror(look, &mut self.tracing)?;
         let texels = readback::read_texture(run.headset.gpu(), &texture)?;
         let size = [texture.width(), texture.height()];
-        let picture = self.window_picture(size, &texels);
+        let picture = self.screen.show(size, &texels, || self.tracing.next_generation())?;
         let run = self.headset.as_mut().context("no headset")?;
         run.say(now);
         let (readout, gaze) = (run.readout.clone(), run.gaze().0);
@@ -238,23 +238,6 @@ impl Worker {
         drop(state);
         (self.repaint)();
         Ok(())
-    }
-
-    /// Texels as a picture on the window's device.
-    fn window_picture(&mut self, size: [u32; 2], texels: &[[u8; 4]]) -> Picture {
-        let fits = |(texture, _): &&(wgpu::Texture, Picture)| [texture.width(), texture.height()] == size;
-        let (texture, picture) = match self.mirror.as_ref().filter(fits) {
-            Some(known) => known.clone(),
-            None => {
-                let texture = readback::upload_texture(&self.gpu, size);
-                let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-                let picture = Picture { texture: view, generation: self.tracing.next_generation() };
-                self.mirror = Some((texture.clone(), picture.clone()));
-                (texture, picture)
-            }
-        };
-        readback::write_texture(&self.gpu, &texture, texels);
-        picture
     }
 }
 

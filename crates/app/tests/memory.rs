@@ -1,0 +1,248 @@
+//! Memory after many edits and reloads is what it was after the first of them.
+//!
+//! `FOVEA_LONG=1` makes 10,000 edits and 1,000 reloads of them, as docs/reports/window.md reports.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+// Where resident memory can be read.
+#![cfg(target_os = "linux")]
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use egui::{Rect, pos2};
+use fovea_app::cli;
+use fovea_app::document::edits::{Edit, LightEdit, Move};
+use fovea_app::document::parameters::{MaterialParameter, Value};
+use fovea_app::document::{Document, Gesture};
+use fovea_app::gaze::hub::GazeHub;
+use fovea_app::preview::controls::Controls;
+use fovea_app::preview::engine::{Engine, Look};
+use fovea_app::preview::gaze::{Gaze, ScreenMapping};
+use fovea_app::preview::navigation::Navigation;
+use fovea_app::reload::rule::Timing;
+use fovea_app::reload::{LoadEvent, Loader};
+use fovea_app::session::{self, Loaded, Source};
+use glam::{UVec2, Vec3};
+use serde_json::json;
+use tracer::gpu::{AdapterSelect, Gpu};
+
+#[path = "support/figures.rs"]
+mod figures;
+#[path = "support/glb.rs"]
+mod glb;
+
+/// Two in one process would measure each other.
+static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+
+/// The scene's version of this number: the built-in one with a lamp, whose colours, places and number of objects change.
+fn file(number: usize) -> Vec<u8> {
+    glb::with_json(tracer::builtin::BYTES, |document| {
+        document["extensions"]["KHR_lights_punctual"]["lights"] = json!([{ "type": "point", "intensity": 5.0 }]);
+        document["extensionsUsed"].as_array_mut().unwrap().push(json!("KHR_lights_punctual"));
+        let lamp = json!({ "name": "lamp", "translation": [0.5, 2.0, 0.5],
+            "extensions": { "KHR_lights_punctual": { "light": 0 } } });
+        let nodes = document["nodes"].as_array_mut().unwrap();
+        nodes.push(lamp);
+        let index = nodes.len() - 1;
+        let vase = nodes.iter_mut().find(|node| node["name"] == "vase").unwrap();
+        vase["translation"] = json!([0.0, 0.0, 0.05 * (number % 3) as f64]);
+        let roots = document["scenes"][0]["nodes"].as_array_mut().unwrap();
+        // Every tenth version lacks an object: its geometry is another.
+        if number % 10 == 9 {
+            roots.remove(0);
+        }
+        roots.push(json!(index));
+        let red = 0.1 + 0.8 * (number % 7) as f64 / 7.0;
+        glb::material(document, "glazed red")["pbrMetallicRoughness"]["baseColorFactor"] = json!([red, 0.1, 0.1, 1.0]);
+    })
+}
+
+/// An engine that shows a document, without a window.
+struct Session {
+    engine: Engine,
+    gpu: Gpu,
+    look: Look,
+    document: Document,
+    /// Versions that the engine was given.
+    given: u64,
+}
+
+impl Session {
+    fn open(loaded: &Loaded) -> Self {
+        let args = cli::parse("fovea --max-bounces 1 --film-memory 16 --mode od".split(' ').map(Into::into)).unwrap();
+        let args = args.preview;
+        let gpu = Gpu::headless(&AdapterSelect::Auto).unwrap();
+        let hub = Arc::new(GazeHub::new(&[], None).unwrap());
+        let engine = Engine::start(gpu.clone(), &args, hub, || ()).unwrap();
+        let controls = Controls::from(&args);
+        let rect = Rect::from_min_max(pos2(0.0, 0.0), pos2(160.0, 90.0));
+        let camera = &session::viewpoints(&loaded.scene)[0];
+        let look = Look {
+            standpoint: Navigation::new(camera.position, camera.rotation, camera.vfov, 16.0 / 9.0, 8.0).standpoint,
+            gaze: Gaze::default(),
+            mapping: ScreenMapping::new(controls.screen, rect, None),
+            controls,
+            size_px: UVec2::new(160, 90),
+            pointer: None,
+        };
+        let mut session = Self { engine, gpu, look, document: Document::new(loaded), given: 0 };
+        session.show();
+        session
+    }
+
+    /// Gives the engine the document's version and waits for its picture.
+    fn show(&mut self) {
+        self.engine.set_scene(Arc::clone(self.document.version()));
+        self.given += 1;
+        let start = Instant::now();
+        loop {
+            self.engine.look(self.look.clone());
+            let state = self.engine.state();
+            if state.version.number == self.given {
+                return;
+            }
+            let words = state.message.as_ref().map_or("", |message| &message.text);
+            assert!(start.elapsed() < Duration::from_secs(120) && !state.dead, "version {}: {words}", self.given);
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// A change of every kind in turn, and what it changes now and then taken back.
+    fn edit(&mut self, number: usize) {
+        let step = number / 5;
+        let share = (step % 11) as f32 / 11.0;
+        let node = |name| self.document.nodes().iter().position(|node| node.name == name).unwrap() as u32;
+        let material = |name| self.document.version().materials.iter().position(|m| m.name == name).unwrap() as u32;
+        let edit = match number % 5 {
+            0 => Edit::Move(node("vase"), Move { translation: Vec3::new(0.0, share, 0.1), ..Move::default() }),
+            1 => {
+                let color = Value::Color(Vec3::new(0.8, 0.2, share));
+                Edit::Material(material("glazed red"), MaterialParameter::BaseColor, color)
+            }
+            2 => Edit::Light(0, LightEdit { intensity: Some(Vec3::splat(1.0 + share)), ..LightEdit::default() }),
+            3 => Edit::Hide(node("globe"), step.is_multiple_of(2)),
+            // Crosses a feature's edge.
+            _ => Edit::Material(material("clay"), MaterialParameter::Clearcoat, Value::Number((step % 2) as f32)),
+        };
+        let before = Arc::clone(self.document.version());
+        self.document.edit(&edit, Gesture::Once);
+        if number.is_multiple_of(17) {
+            self.document.undo();
+        }
+        if !Arc::ptr_eq(&before, self.document.version()) {
+            self.show();
+        }
+    }
+
+    /// Resident bytes of this process, and bytes that wgpu has allocated on the device.
+    fn memory(&self) -> [f64; 2] {
+        let pages = std::fs::read_to_string("/proc/self/statm").unwrap();
+        let resident: f64 = pages.split(' ').nth(1).unwrap().parse().unwrap();
+        let device = self.gpu.device.generate_allocator_report().map_or(0, |report| report.total_allocated_bytes);
+        [resident * 4096.0, device as f64]
+    }
+}
+
+/// Does something so often and compares memory after the first tenth with that after the last; each is the mean over a
+/// twentieth of the steps, since what is about to be freed comes and goes.
+fn compare(what: &str, count: usize, session: &mut Session, mut step: impl FnMut(&mut Session, usize)) {
+    let start = Instant::now();
+    let (first, last) = (count / 10..count * 3 / 20, count * 19 / 20..count);
+    let mut sums = [[0.0; 2]; 2];
+    for number in 0..count {
+        step(session, number);
+        for (sum, range) in sums.iter_mut().zip([&first, &last]) {
+            if range.contains(&number) {
+                let memory = session.memory();
+                (0..2).for_each(|kind| sum[kind] += memory[kind] / range.len() as f64);
+            }
+        }
+    }
+    let growth = [0, 1].map(|kind| sums[1][kind] / sums[0][kind].max(1.0) - 1.0);
+    let figures = json!({
+        "count": count,
+        "seconds": start.elapsed().as_secs_f64(),
+        "resident_bytes": { "after_first_tenth": sums[0][0], "after_last_tenth": sums[1][0], "growth": growth[0] },
+        "device_bytes": { "after_first_tenth": sums[0][1], "after_last_tenth": sums[1][1], "growth": growth[1] },
+    });
+    eprintln!("{what}: {figures}");
+    figures::keep(&format!("memory-{what}"), &session.gpu.info().name, figures.clone());
+    // Short runs have less to average, and a first tenth in which some things are made for the first time.
+    let bound = if is_long() { 0.02 } else { 0.05 };
+    assert!(growth.iter().all(|growth| *growth <= bound), "memory grows: {figures}");
+}
+
+fn is_long() -> bool {
+    std::env::var_os("FOVEA_LONG").is_some()
+}
+
+fn scratch(name: &str) -> PathBuf {
+    let folder = std::env::temp_dir().join(format!("fovea-memory-{name}-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+fn open(loader: &Loader, path: &std::path::Path) -> Loaded {
+    loader.open(Source::File(path.to_owned()));
+    match wait(loader) {
+        LoadEvent::Opened(_, loaded) => loaded,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn wait(loader: &Loader) -> LoadEvent {
+    let start = Instant::now();
+    loop {
+        if let Some(event) = loader.poll() {
+            return event;
+        }
+        assert!(start.elapsed() < Duration::from_secs(120), "nothing came");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+fn loader() -> Loader {
+    let timing = Timing { quiet: Duration::from_millis(20), ..Timing::default() };
+    Loader::start(cli::parse(["fovea".into()]).unwrap().preview.scene, timing, || {}).unwrap()
+}
+
+#[test]
+fn edits_leave_no_memory_behind() {
+    let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    let folder = scratch("edits");
+    let path = folder.join("room.glb");
+    std::fs::write(&path, file(0)).unwrap();
+    let mut session = Session::open(&open(&loader(), &path));
+    // All that is made once: kernels, and hierarchies of what moves.
+    (0..10).for_each(|number| session.edit(number));
+    let count = if is_long() { 10_000 } else { 300 };
+    compare("edits", count, &mut session, |session, number| session.edit(10 + number));
+    drop(session);
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn reloads_leave_no_memory_behind() {
+    let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    let folder = scratch("reloads");
+    let path = folder.join("room.glb");
+    std::fs::write(&path, file(0)).unwrap();
+    let loader = loader();
+    let mut session = Session::open(&open(&loader, &path));
+    let reload = |session: &mut Session, number: usize| {
+        // Beside it, then in its place: an exporter's next version is never half there.
+        std::fs::write(path.with_extension("part"), file(number)).unwrap();
+        std::fs::rename(path.with_extension("part"), &path).unwrap();
+        match wait(&loader) {
+            LoadEvent::Changed(loaded) => session.document.follow_file(&loaded, None),
+            other => panic!("{other:?}"),
+        };
+        session.show();
+    };
+    (0..20).for_each(|number| reload(&mut session, number));
+    let count = if is_long() { 1000 } else { 60 };
+    compare("reloads", count, &mut session, |session, number| reload(session, 20 + number));
+    drop(session);
+    std::fs::remove_dir_all(folder).unwrap();
+}
