@@ -29,8 +29,11 @@ use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
 use crate::cli::values::CameraChoice;
 use crate::output::free_name;
+use crate::preferences::Store;
 use crate::reload::{LoadEvent, Loader};
-use crate::session::{Loaded, Source, Viewpoint};
+use crate::session::{Loaded, Source};
+
+mod files;
 
 /// How long a note stays.
 const NOTE: Duration = Duration::from_secs(5);
@@ -72,18 +75,23 @@ pub struct Window {
     resumed: Option<Arc<FilmSnapshot>>,
     /// Presses of the headset's mode button that have been followed.
     mode_presses: u64,
+    files: files::Files,
 }
 
 impl Window {
-    /// A window over a running engine.
+    /// A window over a running engine, with what was kept of the last one.
     pub fn new(
         engine: Engine,
         loader: Loader,
         adapter: String,
         args: &PreviewArgs,
         gaze: GazeControl,
+        (store, trouble): (Store, Option<String>),
         screenshot: Option<Screenshot>,
     ) -> Self {
+        let mut controls = Controls::from(args);
+        let mut visibility = Visibility { gaze: gaze.is_worth_showing(), ..Visibility::default() };
+        files::prefer(args, store.kept(), &mut controls, &mut visibility);
         Self {
             engine,
             loader,
@@ -91,8 +99,8 @@ impl Window {
             note: None,
             broken: None,
             adapter,
-            controls: Controls::from(args),
-            visibility: Visibility { gaze: gaze.is_worth_showing(), ..Visibility::default() },
+            controls,
+            visibility,
             gaze,
             scene: None,
             tools: ToolState::default(),
@@ -106,6 +114,7 @@ impl Window {
             screenshot,
             resumed: None,
             mode_presses: 0,
+            files: files::Files::new(store, trouble),
         }
     }
 
@@ -141,6 +150,7 @@ impl Window {
                     let title = format!("{} - Fovea", source.name());
                     ctx.send_viewport_cmd(egui::ViewportCommand::Title(title));
                     self.open(&source, &loaded, rect);
+                    self.add_recent(&source);
                 }
                 LoadEvent::Changed(loaded) => self.follow_file(&loaded),
                 LoadEvent::NotOpened(text) => self.note = Some(Message::now(text, true)),
@@ -157,12 +167,14 @@ impl Window {
     fn open(&mut self, source: &Source, loaded: &Loaded, rect: Rect) {
         let open = OpenScene::new(loaded, self.asked_camera.as_ref());
         let aspect = rect.width() / rect.height().max(1.0);
-        (self.note, self.broken) = (None, None);
+        // What there was to say before there was anything to see is said now.
+        self.note = self.files.trouble.take().map(|text| Message::now(text, false));
+        self.broken = None;
         if let Some(start) = open.viewpoints.get(open.start) {
             let mut navigation = Navigation::new(start.position, start.rotation, start.vfov, aspect, open.diagonal);
             self.camera = open.start;
             if let Some(film) = self.resumed.take() {
-                let (rotation, vfov) = looking_at(&film.header, start, aspect);
+                let (rotation, vfov) = looking_at(&film.header, (start.rotation, start.vfov), aspect);
                 navigation.jump(film.header.pose.position, rotation, vfov);
                 self.engine.request(Request::GoOn(film));
             }
@@ -250,6 +262,7 @@ impl Window {
                 deg_per_px,
                 gaze: self.gaze_direction,
                 selected: &selected,
+                recent: Some(&self.files.recent),
             };
             let (controls, tools, split) = (&mut self.controls, &mut self.tools, &mut self.split);
             for action in overlay::panel(ctx, &facts, controls, tools, split, &mut self.visibility) {
@@ -342,6 +355,7 @@ impl Window {
             Action::Camera(index) => self.jump(index),
             Action::EnterHeadset => self.engine.request(Request::EnterHeadset),
             Action::LeaveHeadset => self.engine.request(Request::LeaveHeadset),
+            Action::File(action) => self.act_on_file(action),
             Action::Split(split_panel::Action::Show(mode)) => {
                 (self.controls.mode, self.controls.comparison) = (mode, None);
                 self.controls.paused = false;
@@ -424,6 +438,12 @@ impl Window {
                 self.visibility.ring = !self.visibility.ring;
             }
         }
+        if plain(Key::Period)
+            && let (Some((_, navigation)), Some(editor)) = (&mut self.scene, &self.editor)
+        {
+            let (centre, radius) = editor.focus();
+            navigation.frame(centre, radius);
+        }
         if plain(Key::V) {
             self.act(if in_headset { Action::LeaveHeadset } else { Action::EnterHeadset });
         }
@@ -441,6 +461,9 @@ impl Window {
         }
         if plain(Key::H) {
             self.visibility.panel = !self.visibility.panel;
+        }
+        if pressed(Modifiers::COMMAND, Key::O) {
+            self.act_on_file(super::file_menu::Action::Choose(super::dialogs::Purpose::Scene));
         }
         if pressed(Modifiers::SHIFT, Key::Slash) || pressed(Modifiers::NONE, Key::Questionmark) {
             self.visibility.keys = !self.visibility.keys;
@@ -467,16 +490,6 @@ impl Window {
             self.controls.mode = seeing::next_mode(self.controls.mode);
         }
     }
-
-    fn open_dropped_file(&mut self, ctx: &Context) {
-        let dropped = ctx.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_owned()));
-        let Some(path) = dropped else { return };
-        let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
-        match (&mut self.editor, extension.as_deref()) {
-            (Some(editor), Some("hdr" | "exr")) => editor.set_environment(path),
-            _ => self.loader.open(Source::File(path)),
-        }
-    }
 }
 
 impl eframe::App for Window {
@@ -498,12 +511,14 @@ impl eframe::App for Window {
         }
         if let (Some((_, navigation)), Some(editor)) = (&mut self.scene, &mut self.editor) {
             let attention = &mut self.controls.attention;
-            let used = attention_tools::point(&response, &navigation.standpoint, self.tools, attention);
+            let standpoint = navigation.standpoint;
+            let is_views = navigation.dragging() || ctx.input(|input| input.modifiers.alt);
+            let used = !is_views && attention_tools::point(&response, &standpoint, self.tools, attention);
             if !used {
-                editor.point(ui, &response, &navigation.standpoint);
+                editor.point(ui, &response, &standpoint);
             }
             if !used && !editor.holds_pointer() {
-                navigation.update(ui, &response);
+                navigation.update(ui, &response, |pointer| editor.pivot(pointer, rect, &standpoint));
             }
         }
         let now = Instant::now();
@@ -544,6 +559,7 @@ impl eframe::App for Window {
                 editor.draw(ui, rect, &look.standpoint);
             }
             self.engine.look(look);
+            self.go_on_with_film();
         }
         gaze_panel::dots(ui, rect, &self.gaze, now);
         if self.gaze.wants_frames() {
@@ -554,7 +570,7 @@ impl eframe::App for Window {
         }
         self.hand_over();
         self.gaze.remember_screen(&self.controls, now);
-        self.open_dropped_file(&ctx);
+        self.follow_files(&ctx, frame);
         if let Some(screenshot) = &mut self.screenshot {
             let trouble = self.note.as_ref().filter(|note| note.wrong && self.loader.loading().is_none());
             let editor = self.editor.as_ref();
@@ -572,10 +588,10 @@ impl eframe::App for Window {
     }
 }
 
-/// Where to look on a film, with a vertical angle that stays on it: a panorama as from the camera, else along its axis.
-fn looking_at(film: &FilmHeader, camera: &Viewpoint, aspect: f32) -> (Quat, f32) {
+/// Where to look on a film, with a vertical angle that stays on it: a panorama as given, else along its axis.
+fn looking_at(film: &FilmHeader, otherwise: (Quat, f32), aspect: f32) -> (Quat, f32) {
     match film.options.mapping {
-        FilmMapping::Equirect => (camera.rotation, camera.vfov),
+        FilmMapping::Equirect => otherwise,
         FilmMapping::Perspective { half_extent: [x, y] } => {
             (film.pose.world_from_film, 2.0 * y.min(x / aspect.max(1e-3)).atan())
         }
