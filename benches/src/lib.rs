@@ -7,7 +7,7 @@ use tracer::{
     builtin,
     import::{ImportError, ImportOptions, load_gltf},
     renderer::FilmPose,
-    scene::{ContentHash, Environment, Instance, Material, Mesh, Scene},
+    scene::{Backdrop, ContentHash, Environment, Instance, Material, Mesh, Scene},
 };
 
 /// A scene of one far triangle under a constant sky: almost nothing but ray generation.
@@ -40,6 +40,7 @@ pub fn one_triangle() -> Scene {
         lights: Vec::new(),
         cameras: Vec::new(),
         environment: Environment::Constant(Vec3::ONE),
+        backdrop: Backdrop::default(),
         origin_in_file: DVec3::ZERO,
     }
 }

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use glam::{Affine3A, DVec3, Vec2, Vec3, Vec4};
 use tracer::scene::{
-    ContentHash, Environment, EnvironmentImage, Instance, Material, Mesh, PunctualLight, Scene, TexelEncoding, Texture,
-    TextureRef, WrapMode,
+    Backdrop, ContentHash, Environment, EnvironmentImage, Instance, Material, Mesh, PunctualLight, Scene,
+    TexelEncoding, Texture, TextureRef, WrapMode,
 };
 
 /// A scene under construction.
@@ -70,6 +70,7 @@ impl Builder {
             lights: Vec::new(),
             cameras: Vec::new(),
             environment: Environment::Constant(environment),
+            backdrop: Backdrop::default(),
             origin_in_file: DVec3::ZERO,
         })
     }

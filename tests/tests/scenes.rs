@@ -14,7 +14,7 @@ use tracer::{
     film::FilmOptions,
     gpu::Gpu,
     renderer::{FilmPose, Renderer, RendererOptions, SamplingTechnique},
-    scene::{Material, PunctualKind, PunctualLight, Scene, TexelEncoding},
+    scene::{AlphaMode, Backdrop, Material, PunctualKind, PunctualLight, Scene, TexelEncoding},
 };
 
 const SAMPLES: u64 = 1 << 17;
@@ -396,6 +396,58 @@ fn light_through_a_clear_sheet() {
         });
     };
     assert_is("a sun behind a sheet", measure(&gpu, &with_sheet(&sun), ray, 1), 0.5 * 0.7 / PI * 5.0 * 0.8);
+}
+
+/// A backdrop is what camera rays see that leave the scene, through cut-outs and clear sheets too; what is lit is so to the
+/// last bit as without it. A mirror shows the environment.
+#[test]
+fn a_backdrop_is_seen_and_lights_nothing() {
+    let gpu = device::gpu();
+    let mut builder = Builder::new(Vec3::ZERO);
+    floor(&mut builder, 0.7);
+    let plain = Material { metallic: 0.0, double_sided: true, ..Default::default() };
+    let cut_out = builder.material(Material {
+        base_color: Vec3::ONE.extend(0.25),
+        alpha_mode: AlphaMode::Mask { cutoff: 0.5 },
+        ..plain.clone()
+    });
+    let sheet = builder.material(Material {
+        base_color: Vec3::splat(0.5).extend(1.0),
+        roughness: 0.0,
+        ior: 1.0,
+        specular: 0.0,
+        transmission: 1.0,
+        ..plain
+    });
+    let mirror = builder.material(Material { roughness: 0.0, ..Default::default() });
+    // Four walls side by side, 2 m wide, at z = -2; the last place is empty.
+    for (place, material) in [cut_out, sheet, mirror].into_iter().enumerate() {
+        builder.quad(Vec3::new(2.0 * place as f32, 0.5, -2.0), Vec3::X * 2.0, Vec3::Y * 2.0, material);
+    }
+    let mut plain = builder.build();
+    plain.environment = even_image(1.0);
+    let with = |color: Vec3| Scene { backdrop: Backdrop::Color(color), ..plain.clone() };
+    let color = Vec3::new(0.25, 0.5, 0.125);
+    let luminance = f64::from(color.dot(Vec3::new(0.2126, 0.7152, 0.0722)));
+    let ray = |x: f32, y: f32| [Vec3::new(x, 1.5, 2.0), Vec3::new(x, y, -2.0)];
+    let backdropped = with(color);
+    for (what, ray, expected) in [
+        ("the backdrop", ray(7.0, 1.5), luminance),
+        ("the backdrop through a cut-out", ray(1.0, 1.5), luminance),
+        ("the backdrop through a sheet", ray(3.0, 1.5), 0.5 * luminance),
+    ] {
+        assert_is(what, measure(&gpu, &backdropped, ray, 4), expected);
+    }
+    for (what, ray) in [("a mirror", ray(5.0, 1.5)), ("the floor", ray(1.0, -1.5))] {
+        let (before, after) = (measure(&gpu, &plain, ray, 4), measure(&gpu, &backdropped, ray, 4));
+        eprintln!("{what}: {before:?}, {after:?} with a backdrop");
+        assert_eq!(before, after, "{what}");
+        assert!(before.0 > 0.1, "{what} is lit");
+    }
+    // Black and white with the same samples differ by the empty part of a pixel: here half of one, at the mirror's edge.
+    let edge = [Vec3::new(6.0, 1.5, 2.0), Vec3::new(6.0, 1.5, -2.0)];
+    let [black, white] = [Vec3::ZERO, Vec3::ONE].map(|color| measure(&gpu, &with(color), edge, 4).0);
+    assert!((white - black - 0.5).abs() < 0.01, "{white} {black}");
 }
 
 /// A slab of smooth glass before a glowing wall: T = (1 - R) / (1 + R) with Fresnel's R, all internal reflections summed.

@@ -86,6 +86,9 @@ pub struct PreviewArgs {
     /// Begin in the headset, by OpenXR; the window shows a mirror
     #[arg(long)]
     pub vr: bool,
+    /// Those of [`KEPT_OPTIONS`] that were asked for, rather than left at their defaults.
+    #[arg(skip)]
+    pub stated: Vec<&'static str>,
     /// Memory that the film may take, MiB; more gives a finer panorama
     #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(16..=65536), value_name = "MIB")]
     pub film_memory: u32,
@@ -170,6 +173,9 @@ pub struct RenderArgs {
 /// Options of `fovea render` that say what a film is of, by their field's name: a film that is resumed has them.
 pub const FILM_OPTIONS: [&str; 6] = ["film", "camera", "orient", "seed", "sequence", "max_bounces"];
 
+/// Options of the window that are kept from run to run, by their field's name: what was kept gives way to what is asked for.
+pub const KEPT_OPTIONS: [&str; 4] = ["mode", "exposure", "tonemap", "window"];
+
 /// `fovea merge`.
 #[derive(Clone, Debug, Args)]
 pub struct MergeArgs {
@@ -222,6 +228,9 @@ pub struct SceneArgs {
         value_parser = values::finite, value_name = "DEG"
     )]
     pub env_rotate: f32,
+    /// What the camera sees where it looks past the scene, linear; the environment lights as before [default: it]
+    #[arg(long, value_name = "R,G,B")]
+    pub backdrop: Option<Rgb>,
     /// Angle that directional lights subtend, degrees: higher softens their shadows; the sun has 0.53
     #[arg(
         long, allow_negative_numbers = true, default_value_t = 0.0,
@@ -371,6 +380,10 @@ fn try_parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Cli, clap:
     if let (Some(Command::Render(args)), Some(matches)) = (&mut cli.command, matches.subcommand_matches("render")) {
         let stated = |id: &&str| matches.value_source(id) == Some(ValueSource::CommandLine);
         args.stated = FILM_OPTIONS.into_iter().filter(stated).collect();
+    }
+    if cli.command.is_none() {
+        let stated = |id: &&str| matches.value_source(id) == Some(ValueSource::CommandLine);
+        cli.preview.stated = KEPT_OPTIONS.into_iter().filter(stated).collect();
     }
     Ok(cli)
 }

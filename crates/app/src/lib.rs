@@ -8,14 +8,17 @@
 pub mod attention;
 pub mod cli;
 pub mod commands;
+pub mod config;
 pub mod convergence;
 pub mod document;
 pub mod film;
 pub mod gaze;
 pub mod output;
 pub mod pick;
+pub mod preferences;
 pub mod preview;
 pub mod readback;
+pub mod recent;
 pub mod reload;
 pub mod sampling;
 pub mod screen;

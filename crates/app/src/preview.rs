@@ -14,6 +14,7 @@ use crate::cli::PreviewArgs;
 use crate::commands::print_json;
 use crate::gaze::hub::GazeHub;
 use crate::output::exr;
+use crate::preferences::{Store, WindowPlace};
 use crate::reload::Loader;
 use crate::reload::rule::Timing;
 use crate::session::{self, Source};
@@ -23,11 +24,14 @@ use screenshot::{Outcome, Screenshot};
 use window::Window;
 
 pub mod attention_tools;
+mod background;
 pub mod compare;
 pub mod controls;
+pub mod dialogs;
 pub mod eccentricity;
 pub mod editor;
 pub mod engine;
+pub mod file_menu;
 pub mod frame_times;
 pub mod gaze;
 pub mod gaze_control;
@@ -37,8 +41,10 @@ pub mod keeper;
 pub mod legend;
 pub mod navigation;
 pub mod open_scene;
+mod orbit;
 pub mod overlay;
 pub mod pacing;
+mod place;
 pub mod screenshot;
 pub mod seeing;
 pub mod split_panel;
@@ -64,6 +70,8 @@ pub fn run(args: &PreviewArgs) -> anyhow::Result<()> {
         .screenshot_after
         .zip(args.screenshot.clone())
         .map(|(after, path)| Screenshot::new(after, path, Arc::clone(&outcome)));
+    let (store, trouble) = Store::load();
+    let (kept_theme, kept_place) = (store.kept().theme, store.kept().window);
     let repaint = Repaint::default();
     let repaints = repaint.clone();
     let first = |engine: Engine, adapter| -> anyhow::Result<Window> {
@@ -73,7 +81,7 @@ pub fn run(args: &PreviewArgs) -> anyhow::Result<()> {
             engine.request(Request::EnterHeadset);
         }
         let gaze = GazeControl::new(Arc::clone(&gaze), args);
-        let mut window = Window::new(engine, loader, adapter, args, gaze, screenshot);
+        let mut window = Window::new(engine, loader, adapter, args, gaze, (store, trouble), screenshot);
         if let Some(file) = resumed {
             window.resume(file.film);
         }
@@ -85,8 +93,11 @@ pub fn run(args: &PreviewArgs) -> anyhow::Result<()> {
     let mut lose_at = args.lose_device_after.map(|secs| Instant::now() + Duration::from_secs_f64(secs));
     loop {
         let (shown, first) = (Rc::clone(&window), first.take());
+        let theme = window.borrow().as_ref().map_or(kept_theme, Window::theme);
+        let place = window.borrow().as_ref().map_or(kept_place, Window::place);
         let creator: eframe::AppCreator<'_> = Box::new(|creation| {
             theme::apply(&creation.egui_ctx);
+            creation.egui_ctx.set_theme(theme);
             repaint.aim_at(&creation.egui_ctx);
             let state = creation.wgpu_render_state.as_ref().context("the window has no graphics device")?;
             let gpu = Gpu::adopt(state.adapter.clone(), state.device.clone(), state.queue.clone())?;
@@ -101,7 +112,7 @@ pub fn run(args: &PreviewArgs) -> anyhow::Result<()> {
             Ok(Box::new(Shell { window: shown, lose_at }))
         });
         // Between the frame that does not know of a loss yet and its painting, egui's painter panics.
-        let run = || eframe::run_native("fovea", native_options(args), creator);
+        let run = || eframe::run_native("fovea", native_options(args, place), creator);
         let outcome = catch_unwind(AssertUnwindSafe(run));
         let is_lost = || window.borrow().as_ref().is_some_and(Window::is_lost);
         let lost = match outcome {
@@ -117,6 +128,9 @@ pub fn run(args: &PreviewArgs) -> anyhow::Result<()> {
         }
         losses.count(Instant::now())?;
         lose_at = None;
+    }
+    if let Some(window) = &mut *window.borrow_mut() {
+        window.close()?;
     }
     let outcome = outcome.lock().unwrap_or_else(PoisonError::into_inner).take();
     match outcome {
@@ -136,16 +150,21 @@ fn noticed(is_lost: impl Fn() -> bool) -> bool {
     })
 }
 
-fn native_options(args: &PreviewArgs) -> eframe::NativeOptions {
+fn native_options(args: &PreviewArgs, place: Option<WindowPlace>) -> eframe::NativeOptions {
     let select = args.scene.adapter.clone().map_or(AdapterSelect::Auto, AdapterSelect::Named);
+    let mut viewport = egui::ViewportBuilder::default()
+        // The scene's name comes when it is open.
+        .with_title("Fovea")
+        .with_app_id("fovea")
+        .with_inner_size([args.window.width as f32, args.window.height as f32])
+        .with_min_inner_size([320.0, 240.0])
+        .with_drag_and_drop(true);
+    if let Some(place) = place.filter(|_| !args.stated.contains(&"window")) {
+        viewport = viewport.with_inner_size(place.size).with_maximized(place.maximized);
+        viewport = place.position.map_or(viewport.clone(), |position| viewport.with_position(position));
+    }
     eframe::NativeOptions {
-        viewport: egui::ViewportBuilder::default()
-            // The scene's name comes when it is open.
-            .with_title("Fovea")
-            .with_app_id("fovea")
-            .with_inner_size([args.window.width as f32, args.window.height as f32])
-            .with_min_inner_size([320.0, 240.0])
-            .with_drag_and_drop(true),
+        viewport,
         wgpu_options: WgpuConfiguration { wgpu_setup: setup(select), ..WgpuConfiguration::default() },
         persist_window: false,
         ..eframe::NativeOptions::default()

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use anyhow::{Context, bail};
 use glam::{Quat, Vec3};
 use tracer::import::{ImportOptions, ImportReport, ImportWarning, SceneNode};
-use tracer::scene::{Environment, Projection, PunctualKind, Scene};
+use tracer::scene::{Backdrop, Environment, Projection, PunctualKind, Scene};
 
 use crate::cli::values::CameraChoice;
 use crate::cli::{FileArgs, SceneArgs};
@@ -96,6 +96,9 @@ pub fn load(source: &Source, args: &SceneArgs) -> anyhow::Result<Loaded> {
     if let Some(environment) = environment {
         scene.environment = environment;
         warnings.retain(|warning| *warning != ImportWarning::NoLight);
+    }
+    if let Some(backdrop) = args.backdrop {
+        scene.backdrop = Backdrop::Color(Vec3::from_array(backdrop.0));
     }
     for light in &mut scene.lights {
         if let PunctualKind::Directional { angular_diameter } = &mut light.kind {
@@ -238,6 +241,7 @@ mod tests {
             lights: vec![],
             cameras: vec![],
             environment: Environment::Constant(Vec3::ONE),
+            backdrop: Backdrop::default(),
             origin_in_file: DVec3::ZERO,
         }
     }

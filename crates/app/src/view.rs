@@ -43,6 +43,11 @@ impl View {
         Self::new(yaw, pitch, vfov, vfov).with_aspect(aspect)
     }
 
+    /// The view of these angles, radians: the yaw is wrapped, the pitch stops at +-pi/2.
+    pub fn along_angles(yaw: f32, pitch: f32, tan_half: Vec2) -> Self {
+        Self { yaw: wrap(yaw), pitch: clamp_pitch(pitch), tan_half }
+    }
+
     /// The same height with another width over height.
     #[must_use]
     pub fn with_aspect(self, aspect: f32) -> Self {

@@ -9,6 +9,8 @@ use tracer::film::FilmPixel;
 
 #[path = "films/lost.rs"]
 mod lost;
+#[path = "films/moving.rs"]
+mod moving;
 mod support;
 #[path = "films/tev.rs"]
 mod tev;

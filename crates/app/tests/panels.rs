@@ -19,13 +19,16 @@ use fovea_app::gaze::hub::GazeHub;
 use fovea_app::preview::attention_tools::{Tool, ToolState};
 use fovea_app::preview::compare::{self, Comparison};
 use fovea_app::preview::controls::{Controls, Readout};
+use fovea_app::preview::dialogs::Purpose;
 use fovea_app::preview::editor::panel::{self, Action, PanelState, Tab};
 use fovea_app::preview::gaze_control::GazeControl;
 use fovea_app::preview::overlay::{self, Facts, Visibility};
 use fovea_app::preview::seeing::{self, Seen};
 use fovea_app::preview::split_panel::{self, SplitTimes};
-use fovea_app::preview::{gaze_panel, legend, theme};
+use fovea_app::preview::{file_menu, gaze_panel, legend, theme};
+use fovea_app::recent::RecentFiles;
 use fovea_app::session::{self, Source};
+use tracer::scene::Backdrop;
 use tracer::view::{DebugScale, DebugView, Histogram};
 
 fn args() -> PreviewArgs {
@@ -215,6 +218,20 @@ fn the_environment_is_turned_lit_and_loaded() {
 }
 
 #[test]
+fn the_environment_is_hidden_from_the_camera() {
+    let state = PanelState { tab: Tab::Lights, selected: Some(Part::Environment), ..PanelState::default() };
+    let mut harness = scene_harness(built_in(), state);
+    harness.get_by_label("Visible to the camera").click();
+    harness.run_steps(2);
+    let hidden = harness.state().document.version().backdrop;
+    assert!(matches!(hidden, Backdrop::Color(_)), "{hidden:?}");
+    assert_reachable(&mut harness, "the backdrop");
+    harness.get_by_label("Undo").click();
+    harness.run_steps(2);
+    assert_eq!(harness.state().document.version().backdrop, Backdrop::Environment);
+}
+
+#[test]
 fn a_camera_is_jumped_to() {
     let mut harness = scene_harness(built_in(), PanelState { tab: Tab::Cameras, ..PanelState::default() });
     harness.get_by_label("above").click();
@@ -384,6 +401,55 @@ fn two_modes_are_compared_by_panel_keys_and_pointer() {
     harness.key_press(egui::Key::C);
     harness.run_steps(2);
     assert_eq!(harness.state().comparison, None);
+}
+
+/// The menu of files, open, with one file that is there and one that is gone.
+#[test]
+fn the_menu_of_files_opens_saves_and_changes_the_theme() {
+    let here = std::env::current_exe().unwrap();
+    let gone = here.with_file_name("no such scene.glb");
+    let recent = RecentFiles::new([here.clone(), gone.clone()]);
+    recent.look().unwrap().join().unwrap();
+    let draw = move |ui: &mut egui::Ui, asked: &mut Vec<file_menu::Action>| {
+        asked.extend(file_menu::show(ui, Some(&recent)));
+    };
+    let mut harness = harness(draw, Vec::new());
+    assert_reachable(&mut harness, "the closed menu");
+    let open = |harness: &mut Harness<'_, Vec<file_menu::Action>>| {
+        harness.get_by_label("File").click();
+        harness.run_steps(4);
+    };
+    open(&mut harness);
+    assert_reachable(&mut harness, "the menu");
+    let item = |path: &std::path::Path| {
+        let part = |part: Option<&std::ffi::OsStr>| part.unwrap().to_string_lossy().into_owned();
+        format!("{}/{}", part(path.parent().and_then(std::path::Path::file_name)), part(path.file_name()))
+    };
+    assert!(harness.get_by_label(&item(&gone)).accesskit_node().is_disabled());
+    harness.get_by_label(&item(&here)).click();
+    harness.run_steps(4);
+    for (name, purpose) in [
+        ("Open scene…", Purpose::Scene),
+        ("Open environment…", Purpose::Environment),
+        ("Go on with a film…", Purpose::Film),
+        ("Save picture as…", Purpose::SavePicture),
+        ("Save film as…", Purpose::SaveFilm),
+        ("Save edits as…", Purpose::SaveEdits),
+    ] {
+        open(&mut harness);
+        // A shortcut is part of the label.
+        harness.get_by_label_contains(name).click();
+        harness.run_steps(4);
+        assert_eq!(harness.state().last(), Some(&file_menu::Action::Choose(purpose)), "{name}");
+    }
+    assert_eq!(harness.state()[0], file_menu::Action::Open(here));
+    for (name, theme) in [("Light", egui::Theme::Light), ("Dark", egui::Theme::Dark)] {
+        open(&mut harness);
+        harness.get_by_label(name).click();
+        harness.run_steps(4);
+        assert_eq!(harness.ctx.theme(), theme);
+        assert_eq!(harness.ctx.global_style().visuals.dark_mode, theme == egui::Theme::Dark);
+    }
 }
 
 #[test]

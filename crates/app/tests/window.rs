@@ -5,6 +5,7 @@
 #![cfg(target_os = "linux")]
 
 use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -63,6 +64,30 @@ impl Display {
 
     /// Opens the built-in scene, does `actions` once there is a window, and returns what the window showed and said.
     fn session(&self, seconds: u32, options: &[&str], actions: impl Fn(&Self)) -> (RgbImage, Value) {
+        let settings = self.settings("usual");
+        let shown = self.session_with(&settings, seconds, options, actions);
+        std::fs::remove_dir_all(settings).unwrap();
+        shown
+    }
+
+    /// An empty folder for the settings of windows: what somebody has set for their own screen is not the test's.
+    fn settings(&self, name: &str) -> PathBuf {
+        let number = self.name.trim_start_matches(':');
+        let name = format!("fovea-window-settings-{name}-{}-{number}", std::process::id());
+        let folder = std::env::temp_dir().join(name);
+        let _ = std::fs::remove_dir_all(&folder);
+        std::fs::create_dir_all(&folder).unwrap();
+        folder
+    }
+
+    /// The same with settings that another window may have left.
+    fn session_with(
+        &self,
+        settings: &Path,
+        seconds: u32,
+        options: &[&str],
+        actions: impl Fn(&Self),
+    ) -> (RgbImage, Value) {
         let picture = std::env::temp_dir().join(format!(
             "fovea-window-{}-{}.png",
             std::process::id(),
@@ -71,8 +96,7 @@ impl Display {
         let mut window = Command::new(env!("CARGO_BIN_EXE_fovea"))
             .env("DISPLAY", &self.name)
             .env_remove("WAYLAND_DISPLAY")
-            // What somebody has set for their own screen is not the test's.
-            .env("XDG_CONFIG_HOME", std::env::temp_dir().join("fovea-window-test-settings"))
+            .env("XDG_CONFIG_HOME", settings)
             .args(options)
             .args(["--screenshot-after", &seconds.to_string(), "--screenshot", picture.to_str().unwrap()])
             .stdout(Stdio::piped())
@@ -112,7 +136,7 @@ impl Drop for Display {
 }
 
 /// An empty folder of this test.
-fn scratch(name: &str) -> std::path::PathBuf {
+fn scratch(name: &str) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("fovea-window-{name}-{}", std::process::id()));
     let _ = std::fs::remove_dir_all(&folder);
     std::fs::create_dir_all(&folder).unwrap();
@@ -196,6 +220,42 @@ fn a_trackers_gaze_reaches_the_next_batch_wherever_the_pointer_is() {
     assert!(longest > 8.4, "samples that come during a batch count too: {gaze}");
     assert!(ms("age_ms") > 0.0, "{gaze}");
     eprintln!("density ratio {ratio:.2}, {figures}");
+}
+
+#[test]
+fn a_window_opens_as_it_was_left_and_survives_every_size() {
+    let _alone = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    let Some(display) = Display::start() else {
+        eprintln!("SKIP a_window_opens_as_it_was_left_and_survives_every_size: Xvfb or xdotool is missing");
+        return;
+    };
+    let settings = display.settings("kept");
+    let size_of = |display: &Display, size: &str| {
+        let id = display.xdotool("search --onlyvisible --name Fovea");
+        display.xdotool(&format!("windowsize --sync {id} {size}"));
+        display.xdotool("sleep 0.5");
+        id
+    };
+    let (shown, figures) = display.session_with(&settings, 12, &[], |display| {
+        // As small as a window can get, out of sight and back.
+        let id = size_of(display, "1 1");
+        display.xdotool(&format!("windowunmap --sync {id} sleep 0.5 windowmap --sync {id} sleep 0.5"));
+        size_of(display, "900 640");
+        display.xdotool(&format!("windowfocus --sync {id}"));
+        display.xdotool("mousemove 450 500 sleep 0.5 key m sleep 0.5 key bracketright sleep 0.5 key n sleep 0.5");
+    });
+    assert_eq!((shown.dimensions(), &figures["mode"]), ((900, 640), &Value::from("vp")), "{figures}");
+    let kept: Value = serde_json::from_slice(&std::fs::read(settings.join("fovea/settings.json")).unwrap()).unwrap();
+    assert_eq!((&kept["mode"], &kept["exposure_ev"]), (&Value::from("vp"), &Value::from(0.5)), "{kept}");
+    assert_eq!((&kept["panels"]["scene"], &kept["theme"]), (&Value::from(true), &Value::from("system")), "{kept}");
+
+    let (shown, figures) = display.session_with(&settings, 3, &[], |_| {});
+    assert_eq!((shown.dimensions(), &figures["mode"]), ((900, 640), &Value::from("vp")), "{figures}");
+    // The command line says more, and a broken file does no harm.
+    std::fs::write(settings.join("fovea/settings.json"), "{").unwrap();
+    let (shown, figures) = display.session_with(&settings, 3, &["--window", "800x600"], |_| {});
+    assert_eq!((shown.dimensions(), &figures["mode"]), ((800, 600), &Value::from("fv")), "{figures}");
+    std::fs::remove_dir_all(settings).unwrap();
 }
 
 #[test]
@@ -352,7 +412,7 @@ fn an_object_is_picked_moved_undone_and_saved_and_its_file_broken_and_mended() {
     let walls = redness(&shown, wall.0, wall.1);
     assert!(walls < 0.7, "the walls are not green: {walls}");
     if let Some(folder) = std::env::var_os("FOVEA_SHOTS") {
-        shown.save(std::path::Path::new(&folder).join("replaced.png")).unwrap();
+        shown.save(Path::new(&folder).join("replaced.png")).unwrap();
     }
     std::fs::remove_dir_all(folder).unwrap();
 }

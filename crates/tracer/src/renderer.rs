@@ -450,6 +450,12 @@ impl Renderer {
         self.view.record(encoder, &mut self.pipelines, &key, &source, settings, target)
     }
 
+    /// From now on a pixel of the view with so many samples (1 at first, at least 0.01) is half its own mean and half its
+    /// neighbourhood's, or the picture's from before a restart. Higher is smoother and blurred; what the film holds stays.
+    pub fn set_smoothing(&mut self, samples: f32) {
+        self.view.smoothing_samples = samples.max(0.01);
+    }
+
     /// The present kernels' text by their label.
     ///
     /// # Errors

@@ -32,6 +32,8 @@ pub struct Scene {
     pub cameras: Vec<Camera>,
     /// What rays see that leave the scene.
     pub environment: Environment,
+    /// What the camera sees there.
+    pub backdrop: Backdrop,
     /// The point of the file's world, in metres, that is the origin of every position here.
     pub origin_in_file: DVec3,
 }
@@ -464,6 +466,28 @@ pub enum Environment {
         /// Multiplies the image's radiance.
         intensity: f32,
     },
+}
+
+/// What camera rays see that leave the scene, through cut-outs and clear sheets too. It lights nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Backdrop {
+    /// The environment that lights the scene, with suns that have a size.
+    #[default]
+    Environment,
+    /// A plain colour: linear Rec. 709 radiance, finite and not negative.
+    Color(Vec3),
+}
+
+impl Backdrop {
+    /// The colour that hides the environment; what is not finite or negative becomes 0.
+    pub fn color(self) -> Option<Vec3> {
+        match self {
+            Self::Environment => None,
+            Self::Color(color) => {
+                Some(Vec3::from_array(color.to_array().map(|c| if c.is_finite() { c.max(0.0) } else { 0.0 })))
+            }
+        }
+    }
 }
 
 /// An equirectangular HDR image, row by row from the top (+Y).

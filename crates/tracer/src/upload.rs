@@ -90,6 +90,8 @@ pub struct SceneOnGpu {
     pub environment_radiance: Vec3,
     /// Turns to the right of the environment image.
     pub environment_rotation_turns: f32,
+    /// What camera rays see instead of the environment.
+    pub backdrop: Option<Vec3>,
     /// Largest radiance of any source, for the film's scale.
     pub brightest_radiance: f32,
     /// What it took.
@@ -234,6 +236,7 @@ impl SceneOnGpu {
         }
 
         let light_count = light_table.lights.len() as u32;
+        let backdrop = scene.backdrop.color();
         let has_image = environment.cells_size[0] > 0;
         let (radiance, rotation_turns, brightest) = match &scene.environment {
             Environment::Constant(radiance) => (*radiance, 0.0, radiance.max_element()),
@@ -269,7 +272,11 @@ impl SceneOnGpu {
             },
             environment_radiance: radiance,
             environment_rotation_turns: rotation_turns,
-            brightest_radiance: brightest.max(light_table.brightest).max(1.0),
+            backdrop,
+            brightest_radiance: brightest
+                .max(light_table.brightest)
+                .max(backdrop.map_or(0.0, Vec3::max_element))
+                .max(1.0),
             report: UploadReport {
                 bvh_build_secs: shapes_secs,
                 upload_secs: started.elapsed().as_secs_f64() - shapes_secs,

@@ -69,7 +69,7 @@ pub struct ViewSettings {
     pub ring: Option<(Vec2, f32)>,
 }
 
-/// Samples at which a pixel's own mean weighs as much as its neighbourhood's.
+/// Samples at which a pixel's own mean weighs as much as its neighbourhood's, unless told otherwise.
 pub(crate) const CONFIDENCE_SAMPLES: f32 = 1.0;
 
 /// Where a view is drawn.
@@ -113,6 +113,8 @@ pub(crate) struct ViewRenderer {
     errors: Option<wgpu::Buffer>,
     /// Bound in the place of what a debug view does not read.
     nothing: wgpu::Buffer,
+    /// Samples at which a pixel's own mean weighs as much as its neighbourhood's and as the picture from before a restart.
+    pub smoothing_samples: f32,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -133,6 +135,7 @@ impl ViewRenderer {
             hits: None,
             errors: None,
             nothing: gpu.buffer("nothing", &[0; 64], BufferUsages::STORAGE),
+            smoothing_samples: CONFIDENCE_SAMPLES,
         }
     }
 
@@ -176,7 +179,8 @@ impl ViewRenderer {
         loop {
             self.levels.push(Level { size: level, offset });
             offset += level[0] * level[1];
-            if level[0].max(level[1]) <= 2 {
+            // The last level is one pixel: as long as there is one sample, no part of the view is without a value.
+            if level[0].max(level[1]) <= 1 {
                 break;
             }
             level = [level[0].div_ceil(2), level[1].div_ceil(2)];
@@ -366,7 +370,7 @@ impl ViewRenderer {
             film_half_extent: film.half_extent(),
             film_size: [film.width, film.height],
             quanta_to_radiance: source.quanta_to_radiance,
-            confidence_samples: CONFIDENCE_SAMPLES,
+            confidence_samples: self.smoothing_samples,
             exposure: settings.exposure_ev.exp2(),
             tone_map: settings.tone_map as u32,
             debug_view: settings.debug_view as u32,

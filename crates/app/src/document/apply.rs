@@ -115,6 +115,7 @@ pub fn apply(
         }
     }
     apply_environment(&mut scene.environment, &edits.environment, environments);
+    scene.backdrop = edits.environment.backdrop.unwrap_or(scene.backdrop);
     scene
 }
 

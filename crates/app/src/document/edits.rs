@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use glam::{Quat, Vec3};
+use tracer::scene::Backdrop;
 
 use super::parameters::{MaterialParameter, Value};
 
@@ -55,6 +56,8 @@ pub struct EnvironmentEdit {
     pub rotation_deg: Option<f32>,
     /// Multiplies an image's radiance.
     pub intensity: Option<f32>,
+    /// What the camera sees of it.
+    pub backdrop: Option<Backdrop>,
 }
 
 /// All that differs from the file. Parts are named by their index in it.

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{Quat, Vec3};
 use serde_json::{Map, Value as Json, json};
+use tracer::scene::Backdrop;
 
 use super::edits::{Edits, EnvironmentEdit, LightEdit, Move, NodeEdit};
 use super::parameters::{MaterialParameter, Value};
@@ -20,6 +21,8 @@ use crate::output::{OutputError, write_atomically};
 const FORMAT: &str = "fovea-edits";
 /// Raised when old programs would misread the file.
 const VERSION: u64 = 1;
+/// A backdrop that is the environment.
+const ENVIRONMENT: &str = "environment";
 
 /// Where the edits of a scene are kept.
 pub fn path_for(scene: &Path) -> PathBuf {
@@ -34,10 +37,18 @@ impl Document {
     /// # Errors
     /// When the file cannot be written.
     pub fn save_edits(&mut self, path: &Path) -> Result<(), OutputError> {
-        let text = serde_json::to_string_pretty(&self.to_json()).expect("keys are strings");
-        write_atomically(path, |writer| writeln!(writer, "{text}").map_err(|error| error.to_string()))?;
+        self.copy_edits(path)?;
         self.set_saved();
         Ok(())
+    }
+
+    /// Writes the edits to a file that is not read with the scene: they count as unsaved as before.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn copy_edits(&self, path: &Path) -> Result<(), OutputError> {
+        let text = serde_json::to_string_pretty(&self.to_json()).expect("keys are strings");
+        write_atomically(path, |writer| writeln!(writer, "{text}").map_err(|error| error.to_string()))
     }
 
     /// The edits as one JSON object.
@@ -128,6 +139,11 @@ fn environment_json(edit: &EnvironmentEdit) -> Json {
     if let Some(intensity) = edit.intensity {
         object.insert("intensity".into(), json!(intensity));
     }
+    match edit.backdrop {
+        Some(Backdrop::Environment) => object.insert("backdrop".into(), json!(ENVIRONMENT)),
+        Some(Backdrop::Color(color)) => object.insert("backdrop".into(), json!(color.to_array())),
+        None => None,
+    };
     Json::Object(object)
 }
 
@@ -166,6 +182,10 @@ fn parse(text: &str, names: &Names) -> Result<(Edits, Vec<String>), String> {
         radiance: vector(&environment["radiance"]),
         rotation_deg: number(&environment["rotation_deg"]),
         intensity: number(&environment["intensity"]),
+        backdrop: match &environment["backdrop"] {
+            Json::String(name) if name == ENVIRONMENT => Some(Backdrop::Environment),
+            color => vector(color).map(Backdrop::Color),
+        },
     };
     Ok((edits, left_out))
 }

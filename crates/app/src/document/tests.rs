@@ -1,6 +1,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use glam::{Quat, Vec3};
+use tracer::scene::Backdrop;
 
 use super::edits::{Edit, EnvironmentEdit, LightEdit, Move, Part};
 use super::parameters::{MaterialParameter, Value};
@@ -235,13 +236,14 @@ fn saved_edits_are_read_back_the_same() {
         rotation_deg: Some(33.0),
         intensity: Some(2.0),
         radiance: None,
+        backdrop: Some(Backdrop::Color(Vec3::new(0.25, 0.5, 1.0))),
     };
     for edit in [
         Edit::Move(parent, moved),
         Edit::Hide(child, true),
         rough(1, 0.37),
         Edit::Material(1, MaterialParameter::BaseColor, Value::Color(Vec3::new(0.2, 0.4, 0.6))),
-        Edit::Environment(environment),
+        Edit::Environment(environment.clone()),
     ] {
         document.edit(&edit, Gesture::Once);
     }
@@ -252,7 +254,31 @@ fn saved_edits_are_read_back_the_same() {
     assert_eq!(other.load_edits(&path).unwrap(), Vec::<String>::new());
     assert_eq!(other.edits(), document.edits());
     assert!(!other.is_unsaved() && !other.can_undo());
+    let shown = EnvironmentEdit { backdrop: Some(Backdrop::Environment), ..environment };
+    document.edit(&Edit::Environment(shown), Gesture::Once);
+    document.save_edits(&path).unwrap();
+    other.load_edits(&path).unwrap();
+    assert_eq!(other.edits(), document.edits());
     std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn a_backdrop_hides_the_environment_and_undo_shows_it_again() {
+    let loaded = built_in();
+    let mut document = Document::new(&loaded);
+    let hash = document.version().content_hash();
+    let edit = |backdrop| Edit::Environment(EnvironmentEdit { backdrop, ..EnvironmentEdit::default() });
+    document.edit(&edit(Some(Backdrop::Color(Vec3::new(0.5, f32::NAN, -1.0)))), Gesture::Once);
+    assert_eq!(document.version().backdrop.color(), Some(Vec3::new(0.5, 0.0, 0.0)), "nonsense becomes 0");
+    assert_ne!(document.version().content_hash(), hash, "films of it are others");
+    document.undo();
+    assert_eq!(document.version().backdrop, Backdrop::Environment);
+    // An edit says more than the command line.
+    let mut scene = (*loaded.scene).clone();
+    scene.backdrop = Backdrop::Color(Vec3::ONE);
+    let mut document = Document::new(&Loaded { scene: scene.into(), ..loaded });
+    document.edit(&edit(Some(Backdrop::Environment)), Gesture::Once);
+    assert_eq!((document.version().backdrop, document.version().content_hash()), (Backdrop::Environment, hash));
 }
 
 #[test]

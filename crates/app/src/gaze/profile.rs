@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
 use serde_json::{Value, json};
 
 use super::drift::DriftCorrection;
 use super::parse::edid::{self, MonitorSize};
+use crate::config;
 use crate::screen::ScreenGeometry;
 
 /// One person before one screen.
@@ -66,25 +66,23 @@ pub struct Profiles {
 impl Profiles {
     /// From the user's settings. A file that cannot be read counts as empty and is named in the note.
     pub fn load() -> (Self, Option<String>) {
-        folder().map_or((Self::default(), None), |folder| Self::load_from(&folder.join("gaze.json")))
+        config::folder().map_or((Self::default(), None), |folder| Self::load_from(&folder.join("gaze.json")))
     }
 
     /// From a file.
     pub fn load_from(path: &Path) -> (Self, Option<String>) {
         let mut profiles = Self { path: Some(path.to_owned()), entries: BTreeMap::new() };
-        let text = match std::fs::read_to_string(path) {
-            Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return (profiles, None),
-            Err(error) => return (profiles, Some(format!("{}: {error}", path.display()))),
-        };
-        match serde_json::from_str::<BTreeMap<String, Value>>(&text) {
-            Ok(entries) => {
+        let note = match config::read(path) {
+            Ok(Value::Object(entries)) => {
                 profiles.entries =
                     entries.iter().map(|(key, value)| (key.clone(), Profile::from_json(value))).collect();
-                (profiles, None)
+                None
             }
-            Err(error) => (profiles, Some(format!("{}: {error}; settings of gaze start afresh", path.display()))),
-        }
+            Ok(Value::Null) => None,
+            Ok(_) => Some(format!("{}: no list of profiles; settings of gaze start afresh", path.display())),
+            Err(reason) => Some(format!("{reason}; settings of gaze start afresh")),
+        };
+        (profiles, note)
     }
 
     /// What is remembered of a person before a screen.
@@ -101,32 +99,12 @@ impl Profiles {
         let Some(path) = &self.path else { return Ok(()) };
         let entries: BTreeMap<&String, Value> =
             self.entries.iter().map(|(key, profile)| (key, profile.to_json())).collect();
-        let text = format!("{:#}\n", json!(entries));
-        if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-        }
-        // Replaced in one step, so that an interrupted write leaves the old file.
-        let temporary = path.with_extension("json.new");
-        std::fs::write(&temporary, text).with_context(|| temporary.display().to_string())?;
-        std::fs::rename(&temporary, path).with_context(|| path.display().to_string())
+        config::write(path, &json!(entries))
     }
 }
 
 fn key(person: &str, monitor: &str) -> String {
     format!("{person} @ {monitor}")
-}
-
-/// The folder for this program's settings.
-fn folder() -> Option<PathBuf> {
-    let variable = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
-    let base = if cfg!(windows) {
-        variable("APPDATA")
-    } else if cfg!(target_os = "macos") {
-        variable("HOME").map(|home| home.join("Library/Application Support"))
-    } else {
-        variable("XDG_CONFIG_HOME").or_else(|| variable("HOME").map(|home| home.join(".config")))
-    };
-    base.map(|base| base.join("fovea"))
 }
 
 /// The size of the monitor with so many pixels, as the monitor states it. Linux offers that in `/sys/class/drm`; `None`

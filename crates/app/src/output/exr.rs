@@ -97,6 +97,12 @@ pub fn write(path: &Path, file: &FilmFile) -> std::result::Result<(), OutputErro
     write_atomically(path, |writer| image.write().to_buffered(writer).map_err(|error| error.to_string()))
 }
 
+/// Whether a file says that it is a film, by its header.
+pub fn is_film(path: &Path) -> bool {
+    let header = MetaData::read_from_file(path, false).ok().and_then(|found| found.headers.into_iter().next());
+    header.is_some_and(|header| header.own_attributes.other.contains_key(&Text::from(SETTINGS_ATTRIBUTE)))
+}
+
 /// Reads a film that [`write()`] made. Files of other programs are refused with what they lack.
 pub fn read(path: &Path) -> std::result::Result<FilmFile, OutputError> {
     let unreadable = |reason: String| OutputError::Unreadable { path: path.to_owned(), reason };
@@ -160,6 +166,7 @@ mod tests {
         let path = scratch("round-trip");
         write(&path, &file()).unwrap();
         assert_eq!(read(&path).unwrap(), file());
+        assert!(is_film(&path));
         std::fs::remove_file(path).unwrap();
     }
 
@@ -203,6 +210,7 @@ mod tests {
 
         write_rgb_file(&path, 2, 2, |_, _| (0.0_f32, 0.0_f32, 0.0_f32)).unwrap();
         assert!(read(&path).unwrap_err().to_string().contains("no film of fovea"));
+        assert!(!is_film(&path) && !is_film(&path.with_extension("missing")));
 
         let mut other_size = file();
         other_size.settings["film"]["width"] = 36.into();

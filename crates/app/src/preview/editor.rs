@@ -19,6 +19,7 @@ use gizmo::{Drag, Gizmo, axes_of};
 use outline::{Segment, Silhouette};
 use panel::{Action, PanelState, Tab};
 
+mod focus;
 pub mod gizmo;
 pub mod outline;
 pub mod panel;
@@ -66,15 +67,7 @@ impl Editor {
             Source::BuiltIn => sidecar::path_for(Path::new(BUILT_IN)),
             Source::File(path) => sidecar::path_for(path),
         };
-        let mut editor = Self {
-            document: Document::new(loaded),
-            panel: PanelState::default(),
-            picker: Picker::default(),
-            drag: None,
-            outline: None,
-            message: None,
-            sidecar,
-        };
+        let mut editor = Self::new(loaded, sidecar);
         if editor.sidecar.exists() {
             editor.message = Some(match editor.document.load_edits(&editor.sidecar) {
                 Ok(left_out) if left_out.is_empty() => {
@@ -87,6 +80,19 @@ impl Editor {
             });
         }
         editor
+    }
+
+    /// Without edits; they are saved to `sidecar`.
+    fn new(loaded: &Loaded, sidecar: PathBuf) -> Self {
+        Self {
+            document: Document::new(loaded),
+            panel: PanelState::default(),
+            picker: Picker::default(),
+            drag: None,
+            outline: None,
+            message: None,
+            sidecar,
+        }
     }
 
     /// The scene with its edits.
@@ -122,7 +128,8 @@ impl Editor {
         if ui.input(|input| input.pointer.any_pressed()) {
             self.document.end_gesture();
         }
-        if response.drag_started_by(PointerButton::Primary) {
+        // With Alt the drag is the view's.
+        if response.drag_started_by(PointerButton::Primary) && !ui.input(|input| input.modifiers.alt) {
             let origin = ui.input(|input| input.pointer.press_origin());
             self.drag = origin.and_then(|origin| self.grab(origin, rect, standpoint));
         }
@@ -275,8 +282,15 @@ impl Editor {
     }
 
     fn save(&mut self) {
-        self.message = Some(match self.document.save_edits(&self.sidecar) {
-            Ok(()) => Message::now(format!("saved {}", self.sidecar.display()), false),
+        self.save_as(&self.sidecar.clone());
+    }
+
+    /// Saves the edits to a file; only the one beside the scene is read again with it.
+    pub fn save_as(&mut self, path: &Path) {
+        let is_sidecar = path == self.sidecar;
+        let saved = if is_sidecar { self.document.save_edits(path) } else { self.document.copy_edits(path) };
+        self.message = Some(match saved {
+            Ok(()) => Message::now(format!("saved {}", path.display()), false),
             Err(error) => Message::now(error.to_string(), true),
         });
     }

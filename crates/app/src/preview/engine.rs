@@ -34,6 +34,7 @@ mod headset;
 mod headset;
 
 mod devices;
+mod motion;
 mod priority;
 mod rate;
 mod readout;
@@ -41,17 +42,12 @@ mod saving;
 
 pub use devices::Devices;
 use devices::Screen;
+use motion::{Motion, SEEN_SMOOTHER};
 use rate::Rate;
 pub use readout::{HeadsetReadout, Message, ShownVersion};
 
 /// How long a thread with nothing to trace sleeps between looks at what the window wants.
 const IDLE: Duration = Duration::from_millis(50);
-/// How long after the last movement the picture is drawn in full again.
-const SETTLED: Duration = Duration::from_millis(250);
-/// A picture that takes longer than this is drawn coarser while the view moves.
-const SMOOTH_ENOUGH: Duration = Duration::from_millis(30);
-/// Pixels a texel, along each axis, while the view moves.
-const COARSE_WHILE_MOVING: u32 = 2;
 /// How often figures are read from the device.
 const READ_INTERVAL: Duration = Duration::from_millis(500);
 
@@ -191,7 +187,7 @@ impl Engine {
             repaint: Box::new(repaint),
             shown: None,
             show_time: Duration::ZERO,
-            moved_at: None,
+            motion: Motion::default(),
             rate: Rate::default(),
             traced: Duration::ZERO,
             read_at: None,
@@ -276,8 +272,7 @@ struct Worker {
     shown: Option<Shown>,
     /// How long drawing the picture in full takes.
     show_time: Duration,
-    /// When the view last moved.
-    moved_at: Option<Instant>,
+    motion: Motion,
     rate: Rate,
     /// Time spent tracing since the window opened.
     traced: Duration,
@@ -353,7 +348,7 @@ impl Worker {
         }
         if changed? {
             self.pacing.restart();
-            self.moved_at = Some(Instant::now());
+            self.motion.moves(Instant::now());
         }
         if !look.controls.paused && !self.tracing.is_unfinished() {
             let (samples, took) = self.tracing.trace(self.pacing.batch())?;
@@ -371,7 +366,7 @@ impl Worker {
     fn keep(&mut self) -> anyhow::Result<()> {
         let start = Instant::now();
         let samples = self.tracing.samples();
-        let moving = self.moved_at.is_some_and(|at| at.elapsed() < SETTLED);
+        let moving = self.motion.goes_on(start);
         let bytes = self.tracing.film_bytes();
         if !moving && self.keeper.is_due(start, samples, bytes) {
             lock(&self.shared.survivors).film = self.tracing.snapshot()?.map(Arc::new);
@@ -387,7 +382,10 @@ impl Worker {
     fn is_due(&self, look: &Look) -> bool {
         let Some(shown) = &self.shown else { return true };
         let last = &shown.look;
-        shown.coarseness > self.coarseness()
+        let now = Instant::now();
+        shown.coarseness > self.motion.coarseness(now, self.show_time)
+            || look.controls.paused
+                && shown.smoothing > SEEN_SMOOTHER * self.motion.smoothing(now, self.tracing.samples(), look.size_px)
             || last.standpoint != look.standpoint
             || last.size_px != look.size_px
             || last.controls != look.controls
@@ -396,15 +394,11 @@ impl Worker {
                 && shown.at.elapsed() >= self.pacing.show_interval(self.show_time)
     }
 
-    /// Coarser while the view moves, where drawing is slow: then the frame rate counts.
-    fn coarseness(&self) -> u32 {
-        let moving = self.moved_at.is_some_and(|at| at.elapsed() < SETTLED);
-        if moving && self.show_time > SMOOTH_ENOUGH { COARSE_WHILE_MOVING } else { 1 }
-    }
-
     fn show(&mut self, look: &Look) -> anyhow::Result<()> {
         let start = Instant::now();
-        let coarseness = self.coarseness();
+        let coarseness = self.motion.coarseness(start, self.show_time);
+        let smoothing = self.motion.smoothing(start, self.tracing.samples(), look.size_px);
+        self.tracing.set_smoothing(smoothing);
         let mut picture = self.tracing.show(look, coarseness)?;
         if self.devices.are_two() {
             let (size, texels) = self.tracing.texels()?;
@@ -415,7 +409,7 @@ impl Worker {
         }
         let samples = self.tracing.samples();
         self.gaze.shown(Instant::now(), self.sample);
-        self.shown = Some(Shown { look: look.clone(), samples, coarseness, at: Instant::now() });
+        self.shown = Some(Shown { look: look.clone(), samples, coarseness, smoothing, at: Instant::now() });
         if self.read_at.is_none_or(|at| at.elapsed() >= READ_INTERVAL) {
             let direction = look.standpoint.view.direction_at(look.gaze.point);
             let block = self.tracing.block_at(direction)?;
@@ -522,6 +516,10 @@ impl Worker {
         let Some(version) = lock(&self.shared.version).take() else { return };
         self.busy(Some("preparing the scene".into()));
         self.forget_film();
+        // A first scene has come to rest; another version is an edit that may go on.
+        if self.tracing.is_open() {
+            self.motion.moves(Instant::now());
+        }
         let result = self.tracing.set_scene(version);
         self.busy(None);
         self.failed = None;
@@ -582,6 +580,8 @@ struct Shown {
     samples: u64,
     /// Pixels a texel along each axis.
     coarseness: u32,
+    /// Samples at which a pixel counts as much as what is around it.
+    smoothing: f32,
     at: Instant,
 }
 

@@ -61,10 +61,10 @@ fn choice(ui: &mut Ui, gaze: &mut GazeControl, now: Instant) {
 fn line(ui: &mut Ui, source: &SourceReport) {
     let SourceReport { name, status, active, .. } = source;
     let colour = match status.state {
-        _ if *active => theme::ACCENT,
+        _ if *active => theme::accent(ui),
         SourceState::Connected | SourceState::Searching => ui.visuals().weak_text_color(),
-        SourceState::Stalled | SourceState::Lost(_) => theme::NOTICE,
-        SourceState::Failed(_) => theme::ERROR,
+        SourceState::Stalled | SourceState::Lost(_) => theme::notice(ui),
+        SourceState::Failed(_) => theme::error(ui),
     };
     let mark = if *active { ">" } else { "  " };
     ui.add(egui::Label::new(RichText::new(format!("{mark} {name}")).color(colour)).truncate());
@@ -105,11 +105,11 @@ fn calibration(ui: &mut Ui, gaze: &mut GazeControl, index: usize, source: &Sourc
 fn timing(ui: &mut Ui, timing: &TimingReport, phase: Option<Phase>) {
     if let Some(age) = timing.age {
         let text = RichText::new(format!("Age on screen {:.0} ms", age.as_secs_f64() * 1e3)).small();
-        let text = if timing.is_too_old() { text.color(theme::NOTICE) } else { text };
+        let text = if timing.is_too_old() { text.color(theme::notice(ui)) } else { text };
         ui.label(text).on_hover_text("From the eye to the picture, median");
         if timing.is_too_old() {
             let warning = format!("above {} ms the fovea visibly trails the eye", TOO_OLD.as_millis());
-            ui.label(RichText::new(warning).small().color(theme::NOTICE));
+            ui.label(RichText::new(warning).small().color(theme::notice(ui)));
         }
     }
     if let Some((median, _)) = timing.arrival_to_batch {
@@ -150,7 +150,7 @@ fn setting_up(ui: &mut Ui, gaze: &mut GazeControl, now: Instant) {
     }
     if !gaze.position_known() {
         let text = "The system does not say where the window is: make it fill the screen (F11 of the desktop).";
-        ui.add(egui::Label::new(RichText::new(text).small().color(theme::NOTICE)).wrap());
+        ui.add(egui::Label::new(RichText::new(text).small().color(theme::notice(ui))).wrap());
     }
 }
 
@@ -162,7 +162,7 @@ fn screen(ui: &mut Ui, gaze: &mut GazeControl, now: Instant) {
     };
     ui.add(
         egui::Label::new(
-            RichText::new(format!("{text} Set them under \"Sampling and screen\".")).small().color(theme::NOTICE),
+            RichText::new(format!("{text} Set them under \"Sampling and screen\".")).small().color(theme::notice(ui)),
         )
         .wrap(),
     );
@@ -173,7 +173,7 @@ fn screen(ui: &mut Ui, gaze: &mut GazeControl, now: Instant) {
 
 fn recording(ui: &mut Ui, gaze: &mut GazeControl, rows: Option<u64>, now: Instant) {
     if let Some(rows) = rows {
-        ui.label(RichText::new(format!("recording, {rows} rows")).color(theme::ERROR));
+        ui.label(RichText::new(format!("recording, {rows} rows")).color(theme::error(ui)));
         if ui.button("Stop").clicked() {
             gaze.toggle_recording(now);
         }

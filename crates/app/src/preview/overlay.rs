@@ -8,12 +8,14 @@ use glam::Vec3;
 use super::attention_tools::{self, ToolState};
 use super::controls::{Controls, MODES, Readout, TONE_MAPS, clock, metric};
 use super::engine::HeadsetReadout;
+use super::file_menu;
 use super::histogram;
 use super::seeing;
 use super::split_panel::{self, SplitTimes};
 use super::theme;
 use crate::cli::choices::{Clip, EccentricityAt, Mode, Model};
 use crate::convergence::Progress;
+use crate::recent::RecentFiles;
 
 /// Width of the panel, points.
 const PANEL_WIDTH: f32 = 236.0;
@@ -22,10 +24,14 @@ const OUTLINE_HINT: &str = "Ready: at the gaze, noise is below 20 % of the brigh
 const MATERIAL_HINT: &str = "Ready: at the gaze, noise is below 5 % of the brightness (95 % confidence)";
 
 /// What the keys do, as `?` lists them.
-pub const KEYS: [(&str, &str); 33] = [
+pub const KEYS: [(&str, &str); 38] = [
     ("Drag", "look around; on a handle: move, turn or scale"),
     ("Click", "select what is there"),
     ("Wheel", "zoom at the pointer"),
+    ("Middle drag", "orbit about the selection, or what is there"),
+    ("Shift + middle", "pan"),
+    ("Ctrl + middle", "closer or away; Alt + drag: without middle button"),
+    (".", "frame the selection, or all"),
     ("W A S D  Q E", "fly; Shift: faster"),
     ("1 - 9", "the file's cameras"),
     ("Home", "back to the camera"),
@@ -33,6 +39,7 @@ pub const KEYS: [(&str, &str); 33] = [
     ("T", "handles: move, rotate, scale"),
     ("Ctrl Z", "undo"),
     ("Ctrl Shift Z", "redo"),
+    ("Ctrl O", "open a scene"),
     ("Ctrl E", "save the edits beside the scene"),
     ("Ctrl H", "hide what is selected"),
     ("Shift H", "show it alone, or all again"),
@@ -96,6 +103,8 @@ pub enum Action {
     EnterHeadset,
     /// Show it in the window alone.
     LeaveHeadset,
+    /// Open or save a file.
+    File(file_menu::Action),
     /// Go on with split times.
     Split(split_panel::Action),
 }
@@ -127,6 +136,8 @@ pub struct Facts<'a> {
     pub gaze: Option<Vec3>,
     /// What is selected, in words.
     pub selected: &'a str,
+    /// Files that were opened before.
+    pub recent: Option<&'a RecentFiles>,
 }
 
 /// Draws the panel.
@@ -142,7 +153,7 @@ pub fn panel(
     Area::new(Id::unique("panel")).anchor(Align2::LEFT_TOP, egui::vec2(10.0, 10.0)).show(ctx, |ui| {
         theme::panel().show(ui, |ui| {
             ui.set_width(PANEL_WIDTH);
-            header(ui, facts);
+            header(ui, facts, &mut actions);
             modes(ui, controls);
             figures(ui, facts, controls.paused);
             ui.separator();
@@ -170,8 +181,9 @@ pub fn panel(
     actions
 }
 
-fn header(ui: &mut Ui, facts: &Facts<'_>) {
+fn header(ui: &mut Ui, facts: &Facts<'_>, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
+        actions.extend(file_menu::show(ui, facts.recent).map(Action::File));
         ui.add(egui::Label::new(RichText::new(facts.scene).heading()).truncate());
     });
     ui.add(egui::Label::new(RichText::new(facts.contents).small().weak()).truncate());
@@ -205,7 +217,7 @@ fn figures(ui: &mut Ui, facts: &Facts<'_>, paused: bool) {
     });
     if readout.non_finite_dropped > 0 {
         let text = format!("{} samples were not finite", readout.non_finite_dropped);
-        ui.label(RichText::new(text).small().color(theme::NOTICE));
+        ui.label(RichText::new(text).small().color(theme::notice(ui)));
     }
 }
 
@@ -361,7 +373,7 @@ fn notes(ui: &mut Ui, notes: &[String]) {
     if notes.is_empty() {
         return;
     }
-    let title = RichText::new(format!("Import notes ({})", notes.len())).color(theme::NOTICE);
+    let title = RichText::new(format!("Import notes ({})", notes.len())).color(theme::notice(ui));
     egui::CollapsingHeader::new(title).id_salt("notes").show(ui, |ui| {
         egui::ScrollArea::vertical().max_height(160.0).show(ui, |ui| {
             for note in notes {
@@ -377,11 +389,17 @@ pub fn keys(ctx: &Context) {
         ctx,
         |ui| {
             theme::panel().show(ui, |ui| {
-                Grid::new("keys").num_columns(2).spacing([18.0, 4.0]).show(ui, |ui| {
-                    for (key, does) in KEYS {
-                        ui.label(RichText::new(key).monospace().color(theme::ACCENT));
-                        ui.label(does);
-                        ui.end_row();
+                // Side by side: in one column they would be higher than a small window.
+                ui.horizontal_top(|ui| {
+                    ui.spacing_mut().item_spacing.x = 24.0;
+                    for (column, keys) in KEYS.chunks(KEYS.len().div_ceil(2)).enumerate() {
+                        Grid::new(("keys", column)).num_columns(2).spacing([14.0, 4.0]).show(ui, |ui| {
+                            for (key, does) in keys {
+                                ui.label(RichText::new(*key).monospace().color(theme::accent(ui)));
+                                ui.label(*does);
+                                ui.end_row();
+                            }
+                        });
                     }
                 });
             });
@@ -396,10 +414,10 @@ pub fn message(ctx: &Context, text: &str, wrong: bool, busy: bool) {
         theme::panel().show(ui, |ui| {
             ui.horizontal(|ui| {
                 if busy {
-                    ui.add(egui::Spinner::new().size(13.0).color(theme::ACCENT));
+                    ui.add(egui::Spinner::new().size(13.0).color(theme::accent(ui)));
                 }
                 let text = RichText::new(text);
-                ui.label(if wrong { text.color(theme::ERROR) } else { text });
+                ui.label(if wrong { text.color(theme::error(ui)) } else { text });
             });
         });
     });
@@ -412,7 +430,7 @@ pub fn loading(ctx: &Context, name: &str, elapsed: Duration, can_cancel: bool) -
     area.order(Order::Foreground).show(ctx, |ui| {
         theme::panel().show(ui, |ui| {
             ui.horizontal(|ui| {
-                ui.add(egui::Spinner::new().size(13.0).color(theme::ACCENT));
+                ui.add(egui::Spinner::new().size(13.0).color(theme::accent(ui)));
                 ui.label(format!("loading {name}, {}", clock(elapsed)));
                 cancelled = can_cancel && ui.button("Cancel").clicked();
             });
@@ -427,7 +445,7 @@ pub fn broken(ctx: &Context, text: &str) {
     area.order(Order::Foreground).interactable(false).show(ctx, |ui| {
         theme::panel().show(ui, |ui| {
             ui.set_max_width(0.5 * ui.ctx().content_rect().width());
-            ui.label(RichText::new(text).color(theme::ERROR));
+            ui.label(RichText::new(text).color(theme::error(ui)));
             ui.label(RichText::new("The last good version is shown; the file is watched.").small().weak());
         });
     });

@@ -140,7 +140,7 @@ impl SplitTimes {
             theme::panel().show(ui, |ui| {
                 let object = &run.plan().object;
                 let object = if object.is_empty() { String::new() } else { format!("Look at {object}.  ") };
-                ui.label(RichText::new(format!("{object}{wanted}")).color(theme::ACCENT));
+                ui.label(RichText::new(format!("{object}{wanted}")).color(theme::accent(ui)));
                 ui.label(RichText::new(format!("{trial} of {all}; Esc ends the run")).small().weak());
             });
         });

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
-use egui::{Color32, Context, Key, Modifiers, Rect, Sense, Ui};
+use egui::{Color32, Context, Rect, Sense, Ui};
 use glam::{Quat, UVec2, Vec2, Vec3};
 use tracer::film::{FilmHeader, FilmMapping, FilmSnapshot};
 use tracer::scene::Scene;
@@ -30,8 +30,12 @@ use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
 use crate::cli::values::CameraChoice;
 use crate::output::free_name;
+use crate::preferences::Store;
 use crate::reload::{LoadEvent, Loader};
-use crate::session::{Loaded, Source, Viewpoint};
+use crate::session::{Loaded, Source};
+
+mod files;
+mod keys;
 
 /// How long a note stays.
 const NOTE: Duration = Duration::from_secs(5);
@@ -73,19 +77,24 @@ pub struct Window {
     resumed: Option<Arc<FilmSnapshot>>,
     /// Presses of the headset's mode button that have been followed.
     mode_presses: u64,
+    files: files::Files,
     versions: Versions,
 }
 
 impl Window {
-    /// A window over a running engine.
+    /// A window over a running engine, with what was kept of the last one.
     pub fn new(
         engine: Engine,
         loader: Loader,
         adapter: String,
         args: &PreviewArgs,
         gaze: GazeControl,
+        (store, trouble): (Store, Option<String>),
         screenshot: Option<Screenshot>,
     ) -> Self {
+        let mut controls = Controls::from(args);
+        let mut visibility = Visibility { gaze: gaze.is_worth_showing(), ..Visibility::default() };
+        files::prefer(args, store.kept(), &mut controls, &mut visibility);
         Self {
             engine,
             loader,
@@ -93,8 +102,8 @@ impl Window {
             note: None,
             broken: None,
             adapter,
-            controls: Controls::from(args),
-            visibility: Visibility { gaze: gaze.is_worth_showing(), ..Visibility::default() },
+            controls,
+            visibility,
             gaze,
             scene: None,
             tools: ToolState::default(),
@@ -108,6 +117,7 @@ impl Window {
             screenshot,
             resumed: None,
             mode_presses: 0,
+            files: files::Files::new(store, trouble),
             versions: Versions::default(),
         }
     }
@@ -145,6 +155,7 @@ impl Window {
                     let title = format!("{} - Fovea", source.name());
                     ctx.send_viewport_cmd(egui::ViewportCommand::Title(title));
                     self.open(&source, &loaded, rect);
+                    self.add_recent(&source);
                 }
                 LoadEvent::Changed(loaded) => self.follow_file(&loaded),
                 LoadEvent::NotOpened(text) => self.note = Some(Message::now(text, true)),
@@ -161,12 +172,14 @@ impl Window {
     fn open(&mut self, source: &Source, loaded: &Loaded, rect: Rect) {
         let open = OpenScene::new(loaded, self.asked_camera.as_ref());
         let aspect = rect.width() / rect.height().max(1.0);
-        (self.note, self.broken) = (None, None);
+        // What there was to say before there was anything to see is said now.
+        self.note = self.files.trouble.take().map(|text| Message::now(text, false));
+        self.broken = None;
         if let Some(start) = open.viewpoints.get(open.start) {
             let mut navigation = Navigation::new(start.position, start.rotation, start.vfov, aspect, open.diagonal);
             self.camera = open.start;
             if let Some(film) = self.resumed.take() {
-                let (rotation, vfov) = looking_at(&film.header, start, aspect);
+                let (rotation, vfov) = looking_at(&film.header, (start.rotation, start.vfov), aspect);
                 navigation.jump(film.header.pose.position, rotation, vfov);
                 self.engine.request(Request::GoOn(film));
             }
@@ -254,6 +267,7 @@ impl Window {
                 deg_per_px,
                 gaze: self.gaze_direction,
                 selected: &selected,
+                recent: Some(&self.files.recent),
             };
             let (controls, tools, split) = (&mut self.controls, &mut self.tools, &mut self.split);
             for action in overlay::panel(ctx, &facts, controls, tools, split, &mut self.visibility) {
@@ -346,6 +360,7 @@ impl Window {
             Action::Camera(index) => self.jump(index),
             Action::EnterHeadset => self.engine.request(Request::EnterHeadset),
             Action::LeaveHeadset => self.engine.request(Request::LeaveHeadset),
+            Action::File(action) => self.act_on_file(action),
             Action::Split(split_panel::Action::Show(mode)) => {
                 (self.controls.mode, self.controls.comparison) = (mode, None);
                 self.controls.paused = false;
@@ -369,116 +384,11 @@ impl Window {
         }
     }
 
-    fn keys(&mut self, ctx: &Context, in_headset: bool) {
-        if ctx.egui_wants_keyboard_input() {
-            return;
-        }
-        // Nothing else may change what somebody is timed on.
-        if self.split.is_running() {
-            if ctx.input_mut(|input| input.consume_key(Modifiers::NONE, Key::Escape)) {
-                self.split.stop();
-            }
-            return;
-        }
-        const NUMBERS: [Key; 9] =
-            [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7, Key::Num8, Key::Num9];
-        let pressed = |modifiers, key| ctx.input_mut(|input| input.consume_key(modifiers, key));
-        if let Some(editor) = &mut self.editor {
-            // Several may come in one frame where frames are long.
-            let count = |modifiers, key| ctx.input_mut(|input| input.count_and_consume_key(modifiers, key));
-            let redo = count(Modifiers::COMMAND | Modifiers::SHIFT, Key::Z) + count(Modifiers::COMMAND, Key::Y);
-            let undo = count(Modifiers::COMMAND, Key::Z);
-            (0..undo).for_each(|_| editor.act(editor::panel::Action::Undo));
-            (0..redo).for_each(|_| editor.act(editor::panel::Action::Redo));
-            if pressed(Modifiers::COMMAND, Key::E) {
-                editor.act(editor::panel::Action::Save);
-            }
-            if pressed(Modifiers::COMMAND, Key::H) {
-                editor.hide_selected();
-            }
-            if pressed(Modifiers::SHIFT, Key::H) {
-                editor.toggle_solo();
-            }
-            if pressed(Modifiers::ALT, Key::H) {
-                editor.show_all();
-            }
-            if pressed(Modifiers::NONE, Key::T) {
-                editor.panel.gizmo = editor.panel.gizmo.next();
-            }
-        }
-        seeing::keys(ctx, &mut self.controls);
-        let exr = pressed(Modifiers::COMMAND | Modifiers::SHIFT, Key::S);
-        let png = pressed(Modifiers::COMMAND, Key::S);
-        let plain = |key| pressed(Modifiers::NONE, key);
-        let camera = NUMBERS.iter().position(|key| plain(*key)).or_else(|| plain(Key::Home).then_some(self.camera));
-        let restart = plain(Key::R);
-        if plain(Key::Space) {
-            self.controls.paused = !self.controls.paused;
-        }
-        if plain(Key::M) {
-            self.controls.mode = seeing::next_mode(self.controls.mode);
-        }
-        if pressed(Modifiers::SHIFT, Key::F) {
-            self.visibility.eccentricity = !self.visibility.eccentricity;
-        }
-        if plain(Key::F) {
-            if in_headset {
-                self.engine.request(Request::ToggleMarker);
-            } else {
-                self.visibility.ring = !self.visibility.ring;
-            }
-        }
-        if plain(Key::V) {
-            self.act(if in_headset { Action::LeaveHeadset } else { Action::EnterHeadset });
-        }
-        let stops = f32::from(u8::from(plain(Key::CloseBracket))) - f32::from(u8::from(plain(Key::OpenBracket)));
-        self.controls.exposure_ev = (self.controls.exposure_ev + 0.5 * stops).clamp(-8.0, 8.0);
-        if plain(Key::G) {
-            self.visibility.gaze = !self.visibility.gaze;
-        }
-        if plain(Key::L) {
-            let locked = &mut self.controls.attention.locked_gaze;
-            *locked = if locked.is_some() { None } else { self.gaze_direction };
-        }
-        if plain(Key::N) {
-            self.visibility.editor = !self.visibility.editor;
-        }
-        if plain(Key::H) {
-            self.visibility.panel = !self.visibility.panel;
-        }
-        if pressed(Modifiers::SHIFT, Key::Slash) || pressed(Modifiers::NONE, Key::Questionmark) {
-            self.visibility.keys = !self.visibility.keys;
-        }
-        if pressed(Modifiers::NONE, Key::Escape) {
-            let open = self.visibility.keys || self.gaze.shows_dots();
-            self.visibility.keys = false;
-            self.gaze.stop_dots();
-            if let Some(editor) = self.editor.as_mut().filter(|_| !open) {
-                editor.act(editor::panel::Action::Select(None));
-            }
-        }
-        let actions = [(exr, Action::SaveExr), (png, Action::SavePng), (restart, Action::Restart)];
-        actions.into_iter().filter(|(asked, _)| *asked).for_each(|(_, action)| self.act(action));
-        if let Some(index) = camera {
-            self.jump(index);
-        }
-    }
-
     /// What was pressed in the headset counts as if it had been here.
     fn follow_presses(&mut self, state: &State) {
         while self.mode_presses < state.mode_presses {
             self.mode_presses += 1;
             self.controls.mode = seeing::next_mode(self.controls.mode);
-        }
-    }
-
-    fn open_dropped_file(&mut self, ctx: &Context) {
-        let dropped = ctx.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_owned()));
-        let Some(path) = dropped else { return };
-        let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
-        match (&mut self.editor, extension.as_deref()) {
-            (Some(editor), Some("hdr" | "exr")) => editor.set_environment(path),
-            _ => self.loader.open(Source::File(path)),
         }
     }
 }
@@ -502,12 +412,14 @@ impl eframe::App for Window {
         }
         if let (Some((_, navigation)), Some(editor)) = (&mut self.scene, &mut self.editor) {
             let attention = &mut self.controls.attention;
-            let used = attention_tools::point(&response, &navigation.standpoint, self.tools, attention);
+            let standpoint = navigation.standpoint;
+            let is_views = navigation.dragging() || ctx.input(|input| input.modifiers.alt);
+            let used = !is_views && attention_tools::point(&response, &standpoint, self.tools, attention);
             if !used {
-                editor.point(ui, &response, &navigation.standpoint);
+                editor.point(ui, &response, &standpoint);
             }
             if !used && !editor.holds_pointer() {
-                navigation.update(ui, &response);
+                navigation.update(ui, &response, |pointer| editor.pivot(pointer, rect, &standpoint));
             }
         }
         let now = Instant::now();
@@ -548,6 +460,7 @@ impl eframe::App for Window {
                 editor.draw(ui, rect, &look.standpoint);
             }
             self.engine.look(look);
+            self.go_on_with_film();
         }
         gaze_panel::dots(ui, rect, &self.gaze, now);
         if self.gaze.wants_frames() {
@@ -558,7 +471,7 @@ impl eframe::App for Window {
         }
         self.hand_over();
         self.gaze.remember_screen(&self.controls, now);
-        self.open_dropped_file(&ctx);
+        self.follow_files(&ctx, frame);
         if self.versions.frame(SystemTime::now(), state.version) {
             ctx.request_repaint();
         }
@@ -582,10 +495,10 @@ impl eframe::App for Window {
     }
 }
 
-/// Where to look on a film, with a vertical angle that stays on it: a panorama as from the camera, else along its axis.
-fn looking_at(film: &FilmHeader, camera: &Viewpoint, aspect: f32) -> (Quat, f32) {
+/// Where to look on a film, with a vertical angle that stays on it: a panorama as given, else along its axis.
+fn looking_at(film: &FilmHeader, otherwise: (Quat, f32), aspect: f32) -> (Quat, f32) {
     match film.options.mapping {
-        FilmMapping::Equirect => (camera.rotation, camera.vfov),
+        FilmMapping::Equirect => otherwise,
         FilmMapping::Perspective { half_extent: [x, y] } => {
             (film.pose.world_from_film, 2.0 * y.min(x / aspect.max(1e-3)).atan())
         }

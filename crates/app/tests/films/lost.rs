@@ -130,3 +130,37 @@ fn an_engine_says_that_its_device_is_lost_and_hands_over_what_it_kept() {
     assert!((kept + 1..2 * kept).contains(&state.readout.samples), "{state:?}");
     assert!(!state.lost && state.message.is_none(), "{state:?}");
 }
+
+/// As when a film is dropped onto a window that stands elsewhere.
+#[test]
+fn a_running_engine_goes_on_with_a_film_from_where_it_was_taken() {
+    let folder = Folder::new("dropped-film");
+    let args = args(LINE);
+    let scene = scene(&folder, &args);
+    let look = look(&scene, &args);
+    let device = gpu();
+    let mut tracing = Tracing::new(device.clone(), args.clone());
+    tracing.set_scene(Arc::clone(&scene)).unwrap();
+    tracing.follow(&look).unwrap();
+    tracing.trace(1 << 14).unwrap();
+    let film = Arc::new(tracing.snapshot().unwrap().unwrap());
+    drop(tracing);
+
+    let gaze = Arc::new(GazeHub::new(&args.gaze.sources, None).unwrap());
+    let engine = Engine::start(device, &args, gaze, || {}).unwrap();
+    engine.set_scene(scene);
+    let mut elsewhere = look.clone();
+    elsewhere.standpoint.position.z += 0.5;
+    engine.look(elsewhere);
+    wait_for(&engine, "a picture from elsewhere", |state| state.readout.samples > 0);
+    // The window says where it looks before it asks. Paused, the film stays as it was taken.
+    let mut there = look;
+    there.controls.paused = true;
+    engine.look(there.clone());
+    engine.request(Request::GoOn(film));
+    let state = wait_for(&engine, "the film", |state| state.taken_over == 1 << 14 && state.readout.samples == 1 << 14);
+    assert!(state.message.is_none(), "{state:?}");
+    there.controls.paused = false;
+    engine.look(there);
+    wait_for(&engine, "it goes on", |state| state.readout.samples > 1 << 14);
+}

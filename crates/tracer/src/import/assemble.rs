@@ -12,7 +12,7 @@ use super::hash_meshes;
 use super::material;
 use super::primitive::Built;
 use super::report::{ImportReport, ImportWarning, SceneNode};
-use crate::scene::{Environment, Instance, Material, Mesh, Scene, Texture};
+use crate::scene::{Backdrop, Environment, Instance, Material, Mesh, Scene, Texture};
 
 /// A scene is stored relative to its centre when that is farther from the file's origin than this many diagonals of its
 /// bounding box. At 16, f32 positions have lost 4 of their 24 bits.
@@ -93,6 +93,7 @@ impl Parts<'_> {
             lights: lights.collect(),
             cameras: cameras.collect(),
             environment: Environment::Constant(Vec3::ZERO),
+            backdrop: Backdrop::default(),
             origin_in_file,
         };
         if !has_light(&scene) {

@@ -92,6 +92,8 @@ shared! {
         luminance_scale: f32,
         layer_count: u32,
         use_sobol: u32,
+        backdrop: [f32; 3],
+        has_backdrop: u32,
         stratum_bits: [u32; 2],
         pad_0: [u32; 2],
         order: [[u32; 4]; 5],

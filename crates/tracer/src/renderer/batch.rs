@@ -71,6 +71,8 @@ impl Renderer {
             luminance_scale,
             layer_count,
             use_sobol: u32::from(self.options.sequence == SequenceKind::Sobol),
+            backdrop: scene.backdrop.unwrap_or_default().to_array(),
+            has_backdrop: u32::from(scene.backdrop.is_some()),
             stratum_bits: self.distribution.stratum_bits(&self.options.film),
             pad_0: [0; 2],
             order,

@@ -59,6 +59,8 @@ impl Renderer {
             camera_position: pose.position.to_array(),
             world_from_film: layout::columns(Mat3::from_quat(pose.world_from_film)),
             environment_radiance: next.environment_radiance.map(|c| c * environment),
+            // What is lit does not depend on what stands behind it.
+            has_backdrop: 0,
             layers,
             layer_count,
             ..next

@@ -57,6 +57,7 @@ impl Scene {
         };
         // Debug prints floats so that they read back exactly: different values have different texts.
         let rest = format!("{:?} {:?} {:?} {:?}", self.materials, self.instances, self.lights, self.cameras);
-        ContentHash::of(&[&parts, environment.as_bytes(), rest.as_bytes()])
+        let hash = ContentHash::of(&[&parts, environment.as_bytes(), rest.as_bytes()]);
+        self.backdrop.color().map_or(hash, |color| hash.mix(format!("{color:?}").as_bytes()))
     }
 }

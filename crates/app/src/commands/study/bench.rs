@@ -54,6 +54,7 @@ impl Bench {
             scene: scene.map(|scene| scene.path.clone()),
             camera: scene.and_then(|scene| scene.camera.clone()),
             background: args.background,
+            backdrop: None,
             env: None,
             env_rotate: 0.0,
             sun_angle: 0.0,

@@ -2,7 +2,7 @@
 
 use egui::{DragValue, Grid, Response, RichText, Slider, Ui};
 use glam::{Affine3A, EulerRot, Mat3A, Quat, Vec3};
-use tracer::scene::{Environment, PunctualKind};
+use tracer::scene::{Backdrop, Environment, PunctualKind};
 
 use super::gizmo::GizmoMode;
 use super::panel::{Action, PanelState, node_name, part_name};
@@ -12,6 +12,8 @@ use crate::document::{Document, Gesture};
 
 /// Names of the axes.
 const AXES: [&str; 3] = ["X", "Y", "Z"];
+/// The first colour behind a scene whose environment is hidden: a middle grey.
+const BACKDROP: Vec3 = Vec3::splat(0.18);
 
 /// Draws the properties of a part.
 pub fn show(ui: &mut Ui, document: &Document, part: Part, state: &mut PanelState, actions: &mut Vec<Action>) {
@@ -318,6 +320,21 @@ fn show_environment(ui: &mut Ui, document: &Document, state: &mut PanelState, ac
             ui.end_row();
         }
     });
+    let backdrop = document.version().backdrop;
+    let mut visible = backdrop == Backdrop::Environment;
+    let response = ui.checkbox(&mut visible, "Visible to the camera");
+    if response.on_hover_text("Off: a plain colour behind the scene; the light stays as it is").changed() {
+        let backdrop = Some(if visible { Backdrop::Environment } else { Backdrop::Color(BACKDROP) });
+        set(EnvironmentEdit { backdrop, ..edit.clone() }, Gesture::Once);
+    }
+    if let Backdrop::Color(color) = backdrop {
+        ui.horizontal(|ui| {
+            let label = ui.label(RichText::new("Backdrop").weak());
+            if let Some((color, gesture)) = strong_color(ui, &label, color) {
+                set(EnvironmentEdit { backdrop: Some(Backdrop::Color(color)), ..edit }, gesture);
+            }
+        });
+    }
 }
 
 /// The object's own axes in the world, for handles that scale along them.
