@@ -10,6 +10,7 @@ use tracer::{
     distribution::Distribution,
     film::{FilmOptions, FilmSnapshot},
     gpu::Gpu,
+    kernels::Kernel,
     renderer::{FilmPose, Query, RayKind, Renderer, RendererOptions},
     scene::{Environment, Scene},
 };
@@ -118,4 +119,11 @@ fn a_move_uploads_places_alone_from_the_second_on() {
     scene.instances[instance].visible = true;
     edited.set_scene(&scene).unwrap();
     assert_eq!(picture(&mut edited).words, moved.words, "shown again, and nothing else has changed");
+
+    // Another object leaves the static mesh, and the kernels stay.
+    let kernel = edited.key(Kernel::Trace);
+    let other = (0..scene.instances.len()).find(|&other| other != instance).unwrap();
+    scene.instances[other].world_from_mesh.translation.x += 0.01;
+    edited.set_scene(&scene).unwrap();
+    assert_eq!(edited.key(Kernel::Trace), kernel, "the second object compiles a kernel");
 }

@@ -128,15 +128,15 @@ impl Uploader<'_> {
         Ok(self.gpu.buffer(what, contents, usage))
     }
 
-    /// The `head` bytes at the start of a buffer, with more after them.
+    /// The `head` bytes at the start of a buffer, with more from byte `at` on.
     fn appended<T: bytemuck::NoUninit>(
         &mut self,
         what: &'static str,
         (start, head): (&wgpu::Buffer, u64),
-        tail: &[T],
+        (at, tail): (u64, &[T]),
     ) -> Result<wgpu::Buffer, UploadError> {
         let tail: &[u8] = bytemuck::cast_slice(tail);
-        let size = head + tail.len() as u64;
+        let size = at + tail.len() as u64;
         self.check(what, size)?;
         self.count_new(tail.len() as u64);
         let buffer = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
@@ -145,7 +145,7 @@ impl Uploader<'_> {
             usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        self.gpu.queue.write_buffer(&buffer, head, tail);
+        self.gpu.queue.write_buffer(&buffer, at, tail);
         if head > 0 {
             let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
             encoder.copy_buffer_to_buffer(start, 0, &buffer, 0, head);
@@ -218,8 +218,8 @@ impl SceneOnGpu {
         let nodes = if placement.nodes.is_empty() {
             shape_nodes
         } else {
-            let head = u64::from(shapes.node_count) * NODE_BYTES as u64;
-            uploader.appended("hierarchy nodes", (&shape_nodes, head), &placement.nodes)?
+            let [head, at] = [shapes.node_count, placement.root].map(|nodes| u64::from(nodes) * NODE_BYTES as u64);
+            uploader.appended("hierarchy nodes", (&shape_nodes, head), (at, &placement.nodes))?
         };
         let buffers = [
             nodes,

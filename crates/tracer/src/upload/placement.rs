@@ -12,7 +12,7 @@ use crate::{
 
 /// Instances in the kernels' layout.
 pub(super) struct Placement {
-    /// Of the upper level; they stand behind the shapes' nodes.
+    /// Of the upper level; they stand behind the shapes' nodes, from `root` on.
     pub nodes: Vec<CwBvhNode>,
     /// Entries of the upper level in leaf order, room for the hidden ones, then the parts of the static mesh.
     pub instances: Vec<layout::Instance>,
@@ -68,8 +68,8 @@ impl Placement {
             placement.push(Some(instance), &Affine3A::IDENTITY, codes::NONE, Some(source));
         }
         if !is_single_level {
-            placement.root = shape_nodes;
-            placement.nodes = rebased(&tlas.nodes, shape_nodes, 0).collect();
+            placement.root = rounded_up(shape_nodes);
+            placement.nodes = rebased(&tlas.nodes, placement.root, 0).collect();
             // Each level leaves at most one group behind, and entering a mesh leaves two.
             placement.stack_size = (tlas.depth + deepest + 2).next_multiple_of(4);
         }
@@ -80,6 +80,11 @@ impl Placement {
         self.instances.push(encode_instance(instance, world_from_mesh, root_node));
         self.sources.push(source);
     }
+}
+
+/// To an eighth of its own size at most: the root is a constant of the kernels, and a shape more or less must not compile others.
+fn rounded_up(nodes: u32) -> u32 {
+    nodes.next_multiple_of((nodes / 16).next_power_of_two())
 }
 
 fn encode_instance(instance: Option<&Instance>, world_from_mesh: &Affine3A, root_node: u32) -> layout::Instance {
