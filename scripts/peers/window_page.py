@@ -101,8 +101,8 @@ def main():
 ## Memory
 
 An engine with a document, without a window, on lavapipe, whose device memory is resident memory too. Edits: moves, colours, lights,
-hiding and showing, a clearcoat that comes and goes, and undo. Reloads: colours, places, and now and then an object more or less. Means
-over the twentieth of the steps after the first tenth, and over the last twentieth.
+hiding and showing, a clearcoat that comes and goes, and undo. Reloads: colours, places, and now and then an object more or less. The
+least over the twentieth of the steps after the first tenth, and over the last twentieth: what is about to be freed comes and goes.
 """)
     if edits:
         parts.append(memory("edits", "each is on screen before the next;", edits))

@@ -143,27 +143,28 @@ impl Session {
     }
 }
 
-/// Does something so often and compares memory after the first tenth with that after the last; each is the mean over a
-/// twentieth of the steps, since what is about to be freed comes and goes.
+/// Does something so often and compares memory after the first tenth with that at the end; each is the least over a twentieth of
+/// the steps and over 20 at least: what is about to be freed comes and goes, in blocks of 20 MB.
 fn compare(what: &str, count: usize, session: &mut Session, mut step: impl FnMut(&mut Session, usize)) {
     let start = Instant::now();
-    let (first, last) = (count / 10..count * 3 / 20, count * 19 / 20..count);
-    let mut sums = [[0.0; 2]; 2];
+    let window = (count / 20).max(20);
+    let (first, last) = (count / 10..count / 10 + window, count - window..count);
+    let mut least = [[f64::INFINITY; 2]; 2];
     for number in 0..count {
         step(session, number);
-        for (sum, range) in sums.iter_mut().zip([&first, &last]) {
+        for (least, range) in least.iter_mut().zip([&first, &last]) {
             if range.contains(&number) {
                 let memory = session.memory();
-                (0..2).for_each(|kind| sum[kind] += memory[kind] / range.len() as f64);
+                (0..2).for_each(|kind| least[kind] = least[kind].min(memory[kind]));
             }
         }
     }
-    let growth = [0, 1].map(|kind| sums[1][kind] / sums[0][kind].max(1.0) - 1.0);
+    let growth = [0, 1].map(|kind| least[1][kind] / least[0][kind].max(1.0) - 1.0);
     let figures = json!({
         "count": count,
         "seconds": start.elapsed().as_secs_f64(),
-        "resident_bytes": { "after_first_tenth": sums[0][0], "after_last_tenth": sums[1][0], "growth": growth[0] },
-        "device_bytes": { "after_first_tenth": sums[0][1], "after_last_tenth": sums[1][1], "growth": growth[1] },
+        "resident_bytes": { "after_first_tenth": least[0][0], "after_last_tenth": least[1][0], "growth": growth[0] },
+        "device_bytes": { "after_first_tenth": least[0][1], "after_last_tenth": least[1][1], "growth": growth[1] },
     });
     eprintln!("{what}: {figures}");
     figures::keep(&format!("memory-{what}"), &session.gpu.info().name, figures.clone());
