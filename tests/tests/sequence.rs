@@ -1,6 +1,9 @@
 //! The numbers that a sample's path draws: in OD each film pixel is a stratum, so the samples of a pixel must be as even among
-//! themselves as a (0, 2)-sequence is, in every pair, whatever their number in the whole film.
+//! themselves as a (0, 2)-sequence is, in every pair, whatever their number in the whole film. Over a list of pixels one is a few
+//! strata.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::sync::Arc;
 
 use fovea_tests::{
     device,
@@ -9,7 +12,7 @@ use fovea_tests::{
 };
 use glam::Vec3;
 use tracer::{
-    distribution::Distribution,
+    distribution::{Distribution, Layer},
     film::FilmOptions,
     kernels::ShaderSources,
     renderer::{Renderer, RendererOptions, SequenceKind, StopCondition},
@@ -21,10 +24,14 @@ const PER_PIXEL: u32 = 64;
 
 /// Root mean square error of the pixels' means of three numbers whose mean is a half: the first number of the second pair (the place
 /// in the pixel), of the third, and whether a point of the fourth lies below the diagonal.
-fn errors(sequence: SequenceKind, plant: impl Fn(&ShaderSources) -> ShaderSources) -> [f64; 3] {
+fn errors(
+    sequence: SequenceKind,
+    distribution: Distribution,
+    plant: impl Fn(&ShaderSources) -> ShaderSources,
+) -> [f64; 3] {
     let gpu = device::gpu();
     let options = RendererOptions { film: FILM, max_bounces: 1, seed: 5, sequence };
-    let mut renderer = Renderer::new(&gpu, &options, Distribution::omnidirectional(device::inverse())).unwrap();
+    let mut renderer = Renderer::new(&gpu, &options, distribution).unwrap();
     let sources = instead_of_paths(
         renderer.shaders(),
         "import package::sampling::random::{start_random, first_random_2, next_random_2};
@@ -56,13 +63,28 @@ fn even() -> f64 {
     (1.0 / 12.0 / f64::from(PER_PIXEL).powi(3)).sqrt()
 }
 
+fn everywhere() -> Distribution {
+    Distribution::omnidirectional(device::inverse())
+}
+
+/// All pixels, but as a list of which the first number alone chooses.
+#[test]
+fn the_samples_of_a_listed_pixel_are_a_few_sequences() {
+    let list: Arc<[u32]> = (0..FILM.pixels() as u32).collect();
+    let listed = Distribution::mixture(vec![(1.0, Layer::Pixels(list))], device::inverse()).unwrap();
+    let found = errors(SequenceKind::Sobol, listed, Clone::clone);
+    let independent = (1.0 / 12.0 / f64::from(PER_PIXEL)).sqrt();
+    eprintln!("{found:.5?}, independent numbers {independent:.5}");
+    assert!(found[..2].iter().all(|found| *found < 0.2 * independent), "{found:?} of {independent}");
+}
+
 #[test]
 fn the_samples_of_a_pixel_are_a_sequence() {
     let n = f64::from(PER_PIXEL);
     let uniform = (1.0 / 12.0 / n).sqrt();
     let indicator = (0.25 / n).sqrt();
-    let independent = errors(SequenceKind::Independent, Clone::clone);
-    let sobol = errors(SequenceKind::Sobol, Clone::clone);
+    let independent = errors(SequenceKind::Independent, everywhere(), Clone::clone);
+    let sobol = errors(SequenceKind::Sobol, everywhere(), Clone::clone);
     eprintln!("independent {independent:.5?}, Sobol {sobol:.5?}");
     // 512 pixels: a standard deviation is known to 3 %.
     for (found, expected) in independent.into_iter().zip([uniform, uniform, indicator]) {
@@ -79,7 +101,7 @@ fn the_samples_of_a_pixel_are_a_sequence() {
 /// A stratum's samples numbered by their place in the whole film: pixels get numbers that are far apart in the sequence.
 #[test]
 fn numbers_of_the_whole_film_are_noticed() {
-    let [first, second, _] = errors(SequenceKind::Sobol, |sources| {
+    let [first, second, _] = errors(SequenceKind::Sobol, everywhere(), |sources| {
         exchanged(
             sources,
             "sampling::random",

@@ -1,8 +1,8 @@
 //! Seeded low-discrepancy points by global index: Owen-scrambled Sobol, and independent points for statistics.
 //!
 //! A point is a pure function of `(index, dimension, seed)`, so that a sample does not depend on how the work was cut into
-//! batches. Use: dimensions 0 and 1 choose the direction about the gaze, 2 and 3 the place inside the pixel, the rest the
-//! path.
+//! batches. Use: dimensions 0 and 1 choose the direction about the gaze; the place inside the pixel and the path come from
+//! [`shuffled_pair`]s of the sample's stratum, since the samples of one pixel are far apart in the sequence of all.
 //!
 //! # Numerics
 //! Values are `u32` fractions of 2^32; [`to_unit_f32`] keeps the top 24 bits, so that the f32 is exact and below 1. The

@@ -179,14 +179,19 @@ impl Distribution {
     pub(crate) fn stratum_bits(&self, film: &FilmOptions) -> [u32; 2] {
         let sum: f32 = self.layers.iter().map(|(weight, _)| weight).sum();
         let shares = self.layers.iter().map(|(weight, layer)| {
-            (f64::from(weight / sum) * self.largest_share(layer, film), matches!(layer, Layer::Film))
+            let share = f64::from(weight / sum) * self.largest_share(layer, film);
+            (share, layer)
         });
-        let (share, is_film) = shares.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((1.0, false));
-        if is_film && film.width.is_power_of_two() && film.height.is_power_of_two() && film.pixels() > 2 {
-            return [film.width.ilog2().max(1), film.height.ilog2().max(1)];
-        }
+        let (share, layer) = shares.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((1.0, &Layer::Film));
         let bits = (STRATA_OF_A_PIXEL / share).log2().round().clamp(2.0, 30.0) as u32;
-        [bits.div_ceil(2), bits / 2]
+        match layer {
+            Layer::Film if film.width.is_power_of_two() && film.height.is_power_of_two() => {
+                [film.width, film.height].map(|side| side.ilog2().max(1))
+            }
+            // The first number alone chooses the pixel.
+            Layer::Pixels(_) => [bits - 1, 1],
+            _ => [bits.div_ceil(2), bits / 2],
+        }
     }
 
     /// Share of a layer's samples that falls on the pixel which gets most of them.
