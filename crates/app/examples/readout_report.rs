@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use anyhow::Context;
-use fovea_app::convergence::{Block, MATERIAL, OUTLINE};
+use fovea_app::convergence::{AROUND_RADIUS_PX, Block, MATERIAL, OUTLINE};
 use fovea_app::session::{self, Source};
 use fovea_sampler::{Angle, Geometry, Inverse, RadialDistribution, Reddy2001};
 use glam::{Quat, Vec3};
@@ -23,7 +23,7 @@ use tracer::renderer::{FilmPose, Renderer, RendererOptions, SequenceKind, StopCo
 const FILM: FilmOptions = FilmOptions::equirect(64, 32);
 /// Few, for the same reason: what the read-out says of samples does not depend on where they come from.
 const MAX_BOUNCES: u32 = 2;
-/// As in the window.
+/// The block whose error is said.
 const RADIUS_PX: u32 = 3;
 
 fn main() -> anyhow::Result<()> {
@@ -158,7 +158,7 @@ fn runs_of(gpu: &Gpu, source: &Source, effort: Effort) -> anyhow::Result<OfScene
             // A look every tenth more samples, as the window does.
             let batch = (run.samples() / 10).clamp(1 << 8, 1 << 18) as u32;
             run.trace(batch)?;
-            let block = Block::new(&run.pixels_near(direction, RADIUS_PX)?);
+            let block = Block::new(&run.pixels_near(direction, AROUND_RADIUS_PX)?);
             for (index, (_, threshold)) in THRESHOLDS.into_iter().enumerate() {
                 if !ready[index] && block.is_ready(threshold) {
                     ready[index] = true;
@@ -181,7 +181,7 @@ fn gaze(number: u32) -> Vec3 {
 
 /// Root mean square of the block's error, over its brightness.
 fn true_error(run: &Renderer, reference: &FilmSnapshot, direction: Vec3) -> anyhow::Result<f64> {
-    let found = run.pixels_near(direction, RADIUS_PX)?;
+    let found = run.pixels_near(direction, RADIUS_PX)?.pixels;
     let [x, y] = FILM.pixel_of(direction).context("a panorama has every direction")?;
     let rows = y.saturating_sub(RADIUS_PX)..=(y + RADIUS_PX).min(FILM.height - 1);
     let columns = x.saturating_sub(RADIUS_PX)..=(x + RADIUS_PX).min(FILM.width - 1);

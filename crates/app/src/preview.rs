@@ -167,6 +167,8 @@ fn native_options(args: &PreviewArgs, place: Option<WindowPlace>) -> eframe::Nat
         viewport,
         wgpu_options: WgpuConfiguration { wgpu_setup: setup(select), ..WgpuConfiguration::default() },
         persist_window: false,
+        // The picture has its own eight bits and panels have no gradients.
+        dithering: false,
         ..eframe::NativeOptions::default()
     }
 }

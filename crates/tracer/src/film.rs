@@ -14,6 +14,7 @@ mod probe;
 mod snapshot;
 
 pub use merge::MergeError;
+pub use probe::PixelsNear;
 pub use snapshot::{DamagedFilm, FilmDifference, FilmHeader, FilmPixel, FilmSnapshot, SampleRange};
 pub(crate) use snapshot::{LAST_SAMPLE, joined};
 

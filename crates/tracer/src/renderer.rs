@@ -27,7 +27,7 @@ pub use restore::RestoreError;
 use crate::{
     distribution::Distribution,
     features::{Feature, SceneFeatures},
-    film::{Film, FilmMapping, FilmOptions, FilmPixel, LAST_SAMPLE, ReadError, SampleRange},
+    film::{Film, FilmMapping, FilmOptions, FilmPixel, LAST_SAMPLE, PixelsNear, ReadError, SampleRange},
     gpu::Gpu,
     kernels::{
         self, Kernel, KernelConstants, KernelKey, ShaderSources,
@@ -245,28 +245,17 @@ impl Renderer {
         &self.distribution
     }
 
-    /// The estimates of the film's pixels about a direction of the world, at most `radius` columns and rows away, row by
-    /// row; none where the film does not reach. Waits for the device.
+    /// The estimates of the film's pixels about a direction of the world, at most `radius` columns and rows away. Waits for
+    /// the device.
     ///
     /// # Errors
     /// When the device is lost.
-    pub fn pixels_near(&self, direction: Vec3, radius: u32) -> Result<Vec<FilmPixel>, RenderError> {
+    pub fn pixels_near(&self, direction: Vec3, radius: u32) -> Result<PixelsNear, RenderError> {
         let in_film = self.pose.world_from_film.inverse() * direction;
-        let Some(pixel) = self.options.film.pixel_of(in_film) else { return Ok(Vec::new()) };
-        let words = self.film.words_near(&self.gpu, pixel, radius)?;
+        let Some(pixel) = self.options.film.pixel_of(in_film) else { return Ok(PixelsNear::default()) };
         let (radiance, luminance) = self.film_scales();
         let estimate = |words: &[u32]| FilmPixel::from_words(words, radiance.into(), luminance.into());
-        Ok(words.chunks_exact(kernels::FILM_WORDS as usize).map(estimate).collect())
-    }
-
-    /// Mean number of samples in those pixels; 0 where the film does not reach. Waits for the device.
-    ///
-    /// # Errors
-    /// When the device is lost.
-    pub fn samples_near(&self, direction: Vec3, radius: u32) -> Result<f32, RenderError> {
-        let pixels = self.pixels_near(direction, radius)?;
-        let sum: f64 = pixels.iter().map(|pixel| f64::from(pixel.samples)).sum();
-        Ok((sum / pixels.len().max(1) as f64) as f32)
+        Ok(self.film.pixels_near(&self.gpu, pixel, radius, estimate)?)
     }
 
     /// The texts that the kernels are composed of.

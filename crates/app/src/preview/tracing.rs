@@ -17,7 +17,7 @@ use super::engine::{Look, Picture};
 use crate::attention::Attention;
 use crate::cli::PreviewArgs;
 use crate::cli::choices::{EccentricityAt, Mode};
-use crate::convergence::Block;
+use crate::convergence::{AROUND_RADIUS_PX, Block};
 use crate::film::FilmPlan;
 use crate::output::exr::FilmFile;
 use crate::readback;
@@ -30,9 +30,6 @@ use seeing::Seeing;
 
 mod compare;
 mod seeing;
-
-/// The read-out at the gaze is a mean over so many pixels to each side.
-const READOUT_RADIUS_PX: u32 = 3;
 
 /// Samples at which a pixel counts as much as what is around it and what was there before, while the picture moves. With 1 up to 2.2 %
 /// of a moving picture of the built-in scene were black, with 16 up to 0.22 % (`tests/films/moving.rs`).
@@ -430,7 +427,7 @@ impl Tracing {
     /// What the film pixels about a direction say.
     pub fn block_at(&mut self, direction: Vec3) -> anyhow::Result<Block> {
         self.read_beside(direction)?;
-        Ok(Block::new(&self.renderer()?.pixels_near(direction, READOUT_RADIUS_PX)?))
+        Ok(Block::new(&self.renderer()?.pixels_near(direction, AROUND_RADIUS_PX)?))
     }
 
     /// The picture as it is shown: its size and texels. Waits for the device.

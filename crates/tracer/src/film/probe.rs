@@ -2,8 +2,31 @@
 
 use glam::Vec3;
 
-use super::{Film, FilmMapping, FilmOptions, ReadError, read_ranges};
+use super::{Film, FilmMapping, FilmOptions, FilmPixel, ReadError, read_ranges};
 use crate::{gpu::Gpu, kernels::FILM_WORDS};
+
+/// The estimates of the pixels about one of the film; none where the film does not reach.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PixelsNear {
+    /// Row by row.
+    pub pixels: Vec<FilmPixel>,
+    /// Pixels of a row; at the film's border there are fewer than twice the radius and one.
+    pub columns: usize,
+    /// Column and row, among these, of the pixel that was asked for.
+    pub center: [usize; 2],
+}
+
+impl PixelsNear {
+    /// Those at most `radius` columns and rows from the center, row by row.
+    pub fn within(&self, radius: usize) -> Vec<FilmPixel> {
+        let [x, y] = self.center;
+        let rows = self.pixels.chunks(self.columns.max(1)).enumerate().filter(|(row, _)| row.abs_diff(y) <= radius);
+        rows.flat_map(|(_, row)| row.iter().enumerate())
+            .filter(|(column, _)| column.abs_diff(x) <= radius)
+            .map(|(_, pixel)| *pixel)
+            .collect()
+    }
+}
 
 impl FilmOptions {
     /// The pixel (across, down) that a direction of the film's frame falls on; `None` where the film does not reach.
@@ -29,8 +52,14 @@ impl FilmOptions {
 }
 
 impl Film {
-    /// The words of the pixels at most `radius` columns and rows away; waits for the device.
-    pub fn words_near(&self, gpu: &Gpu, pixel: [u32; 2], radius: u32) -> Result<Vec<u32>, ReadError> {
+    /// The pixels at most `radius` columns and rows away, made of their words by `estimate`; waits for the device.
+    pub(crate) fn pixels_near(
+        &self,
+        gpu: &Gpu,
+        pixel: [u32; 2],
+        radius: u32,
+        estimate: impl Fn(&[u32]) -> FilmPixel,
+    ) -> Result<PixelsNear, ReadError> {
         let [first_x, first_y] = pixel.map(|p| p.saturating_sub(radius));
         let last_x = (pixel[0] + radius).min(self.options.width - 1);
         let last_y = (pixel[1] + radius).min(self.options.height - 1);
@@ -40,7 +69,12 @@ impl Film {
             let slab = self.slabs.iter().find(|s| (s.first_pixel..s.first_pixel + s.pixel_count).contains(&first))?;
             Some((&slab.buffer, u64::from(first - slab.first_pixel) * u64::from(FILM_WORDS) * 4, row_bytes))
         });
-        read_ranges(gpu, &ranges.collect::<Vec<_>>())
+        let words: Vec<u32> = read_ranges(gpu, &ranges.collect::<Vec<_>>())?;
+        Ok(PixelsNear {
+            pixels: words.chunks_exact(FILM_WORDS as usize).map(estimate).collect(),
+            columns: (last_x - first_x + 1) as usize,
+            center: [pixel[0] - first_x, pixel[1] - first_y].map(|distance| distance as usize),
+        })
     }
 }
 
@@ -48,6 +82,18 @@ impl Film {
 mod tests {
     use super::*;
     use crate::distribution::film_direction;
+
+    #[test]
+    fn those_within_a_radius_are_the_middle_ones() {
+        let pixel = |samples| FilmPixel { samples, ..FilmPixel::default() };
+        // Five columns and four rows; the film ends above.
+        let near = PixelsNear { pixels: (0..20).map(pixel).collect(), columns: 5, center: [2, 1] };
+        let samples = |radius| near.within(radius).iter().map(|pixel| pixel.samples).collect::<Vec<_>>();
+        assert_eq!(samples(0), [7]);
+        assert_eq!(samples(1), [1, 2, 3, 6, 7, 8, 11, 12, 13]);
+        assert_eq!(samples(9).len(), 20);
+        assert_eq!(PixelsNear::default().within(3), []);
+    }
 
     #[test]
     fn pixels_and_directions_round_trip() {

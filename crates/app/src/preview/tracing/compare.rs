@@ -11,10 +11,10 @@ use tracer::view::{ViewSettings, ViewTarget};
 
 use super::super::compare::BesideReadout;
 use super::super::engine::{Look, Picture};
-use super::{Open, READOUT_RADIUS_PX, Tracing};
+use super::{Open, Tracing};
 use crate::attention::Attention;
 use crate::cli::choices::Mode;
-use crate::convergence::Block;
+use crate::convergence::{AROUND_RADIUS_PX, Block};
 use crate::film::FilmPlan;
 use crate::readback;
 use crate::sampling::Aim;
@@ -134,7 +134,7 @@ impl Tracing {
     /// Reads the other film about a direction.
     pub(super) fn read_beside(&mut self, direction: glam::Vec3) -> anyhow::Result<()> {
         if let Some(side) = &mut self.beside {
-            side.block = Block::new(&side.renderer.pixels_near(direction, READOUT_RADIUS_PX)?);
+            side.block = Block::new(&side.renderer.pixels_near(direction, AROUND_RADIUS_PX)?);
         }
         Ok(())
     }
