@@ -42,8 +42,8 @@ pub fn upload_texture(gpu: &Gpu, size: [u32; 2]) -> wgpu::Texture {
 }
 
 /// Fills such a texture; `texels` must be as many as it has.
-pub fn write_texture(gpu: &Gpu, texture: &wgpu::Texture, texels: &[[u8; 4]]) {
-    gpu.queue.write_texture(
+pub fn write_texture(queue: &wgpu::Queue, texture: &wgpu::Texture, texels: &[[u8; 4]]) {
+    queue.write_texture(
         texture.as_image_copy(),
         texels.as_flattened(),
         wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(texture.width() * 4), rows_per_image: None },

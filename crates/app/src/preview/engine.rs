@@ -40,8 +40,8 @@ mod rate;
 mod readout;
 mod saving;
 
-pub use devices::Devices;
 use devices::Screen;
+pub use devices::{Devices, Picture};
 use motion::{Motion, SEEN_SMOOTHER};
 use rate::Rate;
 pub use readout::{HeadsetReadout, Message, ShownVersion};
@@ -85,15 +85,6 @@ pub enum Request {
     LeaveHeadset,
     /// Turn the marker of the fovea in the headset on or off.
     ToggleMarker,
-}
-
-/// The picture on the device.
-#[derive(Clone, Debug)]
-pub struct Picture {
-    /// 8-bit texels, encoded for the display.
-    pub texture: wgpu::TextureView,
-    /// Changes with the texture.
-    pub generation: u64,
 }
 
 /// What the thread is up to.
@@ -402,7 +393,7 @@ impl Worker {
         let mut picture = self.tracing.show(look, coarseness)?;
         if self.devices.are_two() {
             let (size, texels) = self.tracing.texels()?;
-            picture = self.screen.show(size, &texels, || self.tracing.next_generation())?;
+            picture = self.screen.show(size, texels, || self.tracing.next_generation());
         }
         if coarseness == 1 {
             self.show_time = start.elapsed();

@@ -376,7 +376,7 @@ impl Tracing {
             self.generations += 1;
             let texture = readback::picture_texture(&self.gpu, size);
             let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-            self.target = Some(Target { texture, picture: Picture { texture: view, generation: self.generations } });
+            self.target = Some(Target { texture, picture: Picture::drawn(view, self.generations) });
         }
         let picture = self.target.as_ref().context("made above")?.picture.clone();
         let settings = view_settings(look, size);

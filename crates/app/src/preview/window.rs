@@ -217,6 +217,7 @@ impl Window {
     /// Puts the engine's texture on the screen.
     fn show_picture(&mut self, ui: &Ui, frame: &eframe::Frame, state: &State, rect: Rect) {
         let (Some(picture), Some(render_state)) = (&state.picture, frame.wgpu_render_state()) else { return };
+        picture.bring(&render_state.queue);
         let mut renderer = render_state.renderer.write();
         let filter = wgpu::FilterMode::Linear;
         let id = match self.texture {

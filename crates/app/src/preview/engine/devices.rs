@@ -5,10 +5,12 @@
 //! engine's thread. On a CPU adapter a batch takes up to a quarter of a second and a kernel seconds, so the film has a device
 //! of its own there, and pictures are copied.
 
+use std::sync::{Arc, Mutex};
+
 use anyhow::Context;
 use tracer::gpu::{AdapterSelect, Gpu};
 
-use super::Picture;
+use super::lock;
 use super::priority::give_way;
 use crate::readback;
 
@@ -60,10 +62,47 @@ impl From<Gpu> for Devices {
     }
 }
 
-/// Puts pictures of other devices onto the window's.
+/// The picture on the window's device.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    /// 8-bit texels, encoded for the display.
+    pub texture: wgpu::TextureView,
+    /// Changes with the texture.
+    pub generation: u64,
+    /// Where it was made on another device.
+    brought: Option<Arc<Brought>>,
+}
+
+/// Texels of another device, and the texture that they are for.
+#[derive(Debug)]
+struct Brought {
+    texture: wgpu::Texture,
+    waiting: Mutex<Option<Texels>>,
+}
+
+/// Row by row, shared.
+type Texels = Arc<Vec<[u8; 4]>>;
+
+impl Picture {
+    /// One that was drawn on the window's device.
+    pub(in super::super) fn drawn(texture: wgpu::TextureView, generation: u64) -> Self {
+        Self { texture, generation, brought: None }
+    }
+
+    /// Fills the texture with what has come since the last time. For the window's thread: another one, which gives way to it, would
+    /// hold the device's locks while it waits for its turn.
+    pub fn bring(&self, queue: &wgpu::Queue) {
+        let Some(brought) = &self.brought else { return };
+        if let Some(texels) = lock(&brought.waiting).take() {
+            readback::write_texture(queue, &brought.texture, &texels);
+        }
+    }
+}
+
+/// Hands pictures of other devices to the window's.
 pub(super) struct Screen {
     gpu: Gpu,
-    shown: Option<(wgpu::Texture, Picture)>,
+    shown: Option<(Picture, Arc<Brought>, Texels)>,
 }
 
 impl Screen {
@@ -72,26 +111,29 @@ impl Screen {
     }
 
     /// Texels as a picture of the window's device; `generation` is asked for a number where the texture is another.
-    pub(super) fn show(
-        &mut self,
-        size: [u32; 2],
-        texels: &[[u8; 4]],
-        generation: impl FnOnce() -> u64,
-    ) -> anyhow::Result<Picture> {
-        let fits = |(texture, _): &(wgpu::Texture, Picture)| [texture.width(), texture.height()] == size;
-        if !self.shown.as_ref().is_some_and(fits) {
-            let texture = readback::upload_texture(&self.gpu, size);
-            let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-            self.shown = Some((texture, Picture { texture: view, generation: generation() }));
-        }
-        let (texture, picture) = self.shown.as_ref().context("made above")?;
-        readback::write_texture(&self.gpu, texture, texels);
-        Ok(picture.clone())
+    pub(super) fn show(&mut self, size: [u32; 2], texels: Vec<[u8; 4]>, generation: impl FnOnce() -> u64) -> Picture {
+        let fits = |(_, brought, _): &(Picture, Arc<Brought>, Texels)| {
+            [brought.texture.width(), brought.texture.height()] == size
+        };
+        let (picture, brought) = match self.shown.take().filter(fits) {
+            Some((picture, brought, _)) => (picture, brought),
+            None => {
+                let texture = readback::upload_texture(&self.gpu, size);
+                let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+                let brought = Arc::new(Brought { texture, waiting: Mutex::new(None) });
+                let picture = Picture { texture: view, generation: generation(), brought: Some(Arc::clone(&brought)) };
+                (picture, brought)
+            }
+        };
+        let texels = Arc::new(texels);
+        *lock(&brought.waiting) = Some(Arc::clone(&texels));
+        self.shown = Some((picture.clone(), brought, texels));
+        picture
     }
 
-    /// What was shown last: its size and texels. Waits for the window's device.
-    pub(super) fn texels(&self) -> anyhow::Result<([u32; 2], Vec<[u8; 4]>)> {
-        let (texture, _) = self.shown.as_ref().context("there is no picture yet")?;
-        Ok(([texture.width(), texture.height()], readback::read_texture(&self.gpu, texture)?))
+    /// What was shown last: its size and texels.
+    pub(super) fn texels(&self) -> anyhow::Result<([u32; 2], Texels)> {
+        let (_, brought, texels) = self.shown.as_ref().context("there is no picture yet")?;
+        Ok(([brought.texture.width(), brought.texture.height()], Arc::clone(texels)))
     }
 }

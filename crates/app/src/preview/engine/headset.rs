@@ -221,7 +221,7 @@ impl Worker {
         let texture = run.draw_mirror(look, &mut self.tracing)?;
         let texels = readback::read_texture(run.headset.gpu(), &texture)?;
         let size = [texture.width(), texture.height()];
-        let picture = self.screen.show(size, &texels, || self.tracing.next_generation())?;
+        let picture = self.screen.show(size, texels, || self.tracing.next_generation());
         let run = self.headset.as_mut().context("no headset")?;
         run.say(now);
         let (readout, gaze) = (run.readout.clone(), run.gaze().0);

@@ -13,8 +13,8 @@ pub(super) fn give_way() {
     unsafe extern "C" {
         safe fn setpriority(which: std::ffi::c_int, who: std::ffi::c_uint, nice: std::ffi::c_int) -> std::ffi::c_int;
     }
-    /// A third of the weight of a thread of normal priority.
-    const NICE: std::ffi::c_int = 5;
+    /// A thirtieth of the weight of a thread of normal priority.
+    const NICE: std::ffi::c_int = 15;
     // Where it is not allowed, frames take longer.
     let _ = setpriority(THREAD, 0, NICE);
 }

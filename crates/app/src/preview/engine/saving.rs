@@ -11,8 +11,11 @@ use crate::output::{exr, png};
 impl Worker {
     /// The picture as it is shown: the headset's mirror while there is one.
     pub(super) fn save_png(&self, path: &Path) -> anyhow::Result<()> {
-        let ([width, height], texels) =
-            if self.headset.is_some() { self.screen.texels()? } else { self.tracing.texels()? };
+        if self.headset.is_some() {
+            let ([width, height], texels) = self.screen.texels()?;
+            return Ok(png::write(path, width, height, &texels)?);
+        }
+        let ([width, height], texels) = self.tracing.texels()?;
         Ok(png::write(path, width, height, &texels)?)
     }
 
