@@ -25,6 +25,7 @@ use window::Window;
 
 pub mod attention_tools;
 mod background;
+mod canvas;
 pub mod compare;
 pub mod controls;
 pub mod dialogs;

@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
-use egui::{Color32, Context, Rect, Sense, Ui};
+use egui::{Context, Rect, Sense, Ui};
 use glam::{Quat, UVec2, Vec2, Vec3};
 use tracer::film::{FilmHeader, FilmMapping, FilmSnapshot};
 use tracer::scene::Scene;
 
 use super::attention_tools::{self, ToolState};
+use super::canvas;
 use super::compare;
 use super::controls::Controls;
 use super::eccentricity;
@@ -71,7 +72,6 @@ pub struct Window {
     given: Option<Arc<Scene>>,
     asked_environment: Option<PathBuf>,
     camera: usize,
-    texture: Option<(egui::TextureId, u64)>,
     screenshot: Option<Screenshot>,
     /// A film to go on with once its scene is open.
     resumed: Option<Arc<FilmSnapshot>>,
@@ -113,7 +113,6 @@ impl Window {
             given: None,
             asked_environment: None,
             camera: 0,
-            texture: None,
             screenshot,
             resumed: None,
             mode_presses: 0,
@@ -141,7 +140,7 @@ impl Window {
         if let Some(film) = film {
             engine.request(Request::GoOn(film));
         }
-        (self.engine, self.adapter, self.texture, self.mode_presses) = (engine, adapter, None, 0);
+        (self.engine, self.adapter, self.mode_presses) = (engine, adapter, 0);
         self.versions = Versions::default();
         self.note =
             Some(Message::now("the graphics device was lost; the film goes on from its last snapshot".into(), false));
@@ -212,25 +211,6 @@ impl Window {
                 self.loader.load_environment(path.to_owned());
             }
         }
-    }
-
-    /// Puts the engine's texture on the screen.
-    fn show_picture(&mut self, ui: &Ui, frame: &eframe::Frame, state: &State, rect: Rect) {
-        let (Some(picture), Some(render_state)) = (&state.picture, frame.wgpu_render_state()) else { return };
-        picture.bring(&render_state.queue);
-        let mut renderer = render_state.renderer.write();
-        let filter = wgpu::FilterMode::Linear;
-        let id = match self.texture {
-            Some((id, generation)) if generation == picture.generation => id,
-            Some((id, _)) => {
-                renderer.update_egui_texture_from_wgpu_texture(&render_state.device, &picture.texture, filter, id);
-                id
-            }
-            None => renderer.register_native_texture(&render_state.device, &picture.texture, filter),
-        };
-        self.texture = Some((id, picture.generation));
-        let whole = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
-        ui.painter().image(id, rect, whole, Color32::WHITE);
     }
 
     fn look(&self, ctx: &Context, rect: Rect, gaze: Gaze, pointer: Option<Vec2>) -> Option<(Look, f32)> {
@@ -433,7 +413,9 @@ impl eframe::App for Window {
         if let Some(target) = target {
             self.controls.acuity.gaze_error_deg = target.accuracy_deg;
         }
-        self.show_picture(ui, frame, &state, rect);
+        if let (Some(picture), Some(render_state)) = (&state.picture, frame.wgpu_render_state()) {
+            ui.painter().add(canvas::shape(picture.clone(), rect, render_state.target_format));
+        }
         let mut deg_per_px = 0.0;
         let pointer = gaze::pointer(&response).map(|[x, y]| Vec2::new(x as f32, y as f32));
         let gaze = Gaze { point: target.map(|target| target.point).unwrap_or_default() };
