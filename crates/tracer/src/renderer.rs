@@ -23,6 +23,7 @@ pub use options::{
 pub use panorama::Refreshed;
 pub use query::{Query, QueryAnswer, RayKind};
 pub use restore::RestoreError;
+pub use timing::BatchSeconds;
 
 use crate::{
     distribution::Distribution,

@@ -63,7 +63,9 @@ pub struct UploadReport {
     pub upload_secs: f64,
     /// Bytes of buffers and textures on the device.
     pub device_bytes: u64,
-    /// Bytes of those that were handed over now; the rest was there since an earlier version of the scene.
+    /// Bytes of those that hold hierarchies, corners, triangles and vertices.
+    pub geometry_bytes: u64,
+    /// Bytes of the whole that were handed over now; the rest was there since an earlier version of the scene.
     pub uploaded_bytes: u64,
     /// Triangles in the hierarchies, each mesh once.
     pub triangles: u64,
@@ -231,6 +233,7 @@ impl SceneOnGpu {
             cache.table("texture slots", &slots, &mut uploader)?,
             cache.table("lights", &light_table.lights, &mut uploader)?,
         ];
+        let geometry_bytes = buffers[..4].iter().map(wgpu::Buffer::size).sum();
         if pollster::block_on(scope.pop()).is_some() {
             return Err(UploadError::OutOfMemory { what: "buffers and textures", bytes: uploader.device_bytes });
         }
@@ -281,6 +284,7 @@ impl SceneOnGpu {
                 bvh_build_secs: shapes_secs,
                 upload_secs: started.elapsed().as_secs_f64() - shapes_secs,
                 device_bytes: uploader.device_bytes,
+                geometry_bytes,
                 uploaded_bytes: uploader.uploaded_bytes,
                 triangles: shapes.shapes.triangles.len() as u64,
                 lights: light_count,
