@@ -7,7 +7,7 @@ use thiserror::Error;
 use wgpu::util::DeviceExt;
 
 use crate::{
-    bvh::NODE_BYTES,
+    bvh::{HierarchyKind, NODE_BYTES},
     features::{Feature, SceneFeatures},
     gpu::Gpu,
     kernels::KernelConstants,
@@ -209,7 +209,7 @@ impl SceneOnGpu {
         let split = cache.split(scene);
         let shapes = cache.shapes(scene, &split, &mut uploader)?;
         let shapes_secs = started.elapsed().as_secs_f64();
-        let mut placement = Placement::of(scene, &split, &shapes.shapes, shapes.node_count);
+        let mut placement = Placement::of(scene, &split, cache.hierarchy(), &shapes.shapes, shapes.node_count);
         let light_table = lights::LightTable::build(scene, &shapes.shapes, &mut placement);
         let texels = cache.texels(scene, &mut uploader)?;
         let (materials, slots) = materials::encode(scene, &texels.offsets);
@@ -250,7 +250,8 @@ impl SceneOnGpu {
         Ok(Self {
             features: features
                 .with(Feature::Lights, light_count > 0)
-                .with(Feature::Instances, !placement.is_single_level),
+                .with(Feature::Instances, !placement.is_single_level)
+                .with(Feature::BinaryNodes, cache.hierarchy() == HierarchyKind::Binary),
             constants: KernelConstants {
                 stack_size: placement.stack_size,
                 root_node: placement.root,

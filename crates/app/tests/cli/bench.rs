@@ -39,8 +39,12 @@ fn the_built_in_scene_is_measured_part_by_part() {
     // Three kinds of rays of OD and two gazes; in a closed room nearly all of them meet something.
     let sets = scene["rays"]["sets"].as_array().unwrap();
     assert_eq!(sets.len(), 9);
+    assert_ne!(scene["rays"]["hierarchy"], scene["rays"]["other_hierarchy"]);
     for set in sets {
-        assert!(all_positive(&set["device_s"], 2) && all_positive(&set["obvhs_s"], 2), "{set}");
+        assert!(
+            all_positive(&set["device_s"], 2) && all_positive(&set["obvhs_s"], 2) && all_positive(&set["other_s"], 2),
+            "{set}"
+        );
         let [count, hits, differs] = ["count", "hits", "hit_or_miss_differs"].map(|key| set[key].as_u64().unwrap());
         assert!((900..=1024).contains(&count) && differs <= count / 100, "{set}");
         assert!(set["rays"] == "shadow" || hits * 10 >= count * 9, "{set}");

@@ -133,6 +133,7 @@ fn rays(scenes: &Found<'_>) -> String {
         "obvhs, M/s",
         "device / obvhs",
         "by gaze",
+        "other hierarchy over this one",
     ]);
     for (name, found) in scenes {
         for kind in KINDS {
@@ -151,6 +152,10 @@ fn rays(scenes: &Found<'_>) -> String {
                 cells.extend([format!("{device:.2}"), format!("{cpu:.2}"), format!("{:.2}", device / cpu)]);
             }
             cells.push(spread(&fv.iter().map(|set| ratio(set)).collect::<Vec<_>>(), 2));
+            let over = |set: &&Value| middle(&set["device_s"]) / middle(&set["other_s"]);
+            let other = found["other_hierarchy"].as_str().unwrap_or("-");
+            let all: Vec<f64> = od.iter().chain(&fv).map(over).collect();
+            cells.push(format!("{other} {}", spread(&all, 2)));
             row(&mut text, &cells);
         }
     }

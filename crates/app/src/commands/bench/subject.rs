@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use anyhow::Context;
 use fovea_sampler::Inverse;
+use tracer::bvh::HierarchyKind;
 use tracer::distribution::Distribution;
 use tracer::film::FilmOptions;
 use tracer::gpu::Gpu;
@@ -72,9 +73,26 @@ impl Subject {
     /// # Errors
     /// When the scene does not fit the adapter.
     pub fn renderer(&self, gpu: &Gpu, args: &BenchArgs, scene: &Scene) -> anyhow::Result<(Renderer, SceneReport)> {
+        self.renderer_with(gpu, args, scene, None)
+    }
+
+    /// The same with hierarchies of a kind, or of the adapter's without one.
+    ///
+    /// # Errors
+    /// When the scene does not fit the adapter.
+    pub fn renderer_with(
+        &self,
+        gpu: &Gpu,
+        args: &BenchArgs,
+        scene: &Scene,
+        hierarchy: Option<HierarchyKind>,
+    ) -> anyhow::Result<(Renderer, SceneReport)> {
         let options = RendererOptions { film: self.film, max_bounces: args.max_bounces, ..Default::default() };
         let first = self.places.first().context("no gaze")?;
         let mut renderer = Renderer::new(gpu, &options, self.distribution(Method::Fv, first))?;
+        if let Some(kind) = hierarchy {
+            renderer.set_hierarchy(kind);
+        }
         let report = renderer.set_scene(scene)?;
         renderer.set_pose(self.pose);
         Ok((renderer, report))
