@@ -13,7 +13,7 @@ pub struct BenchArgs {
     /// glTF scene; FILE@CAMERA takes another camera than the first [default: the built-in scene]
     #[arg(value_name = "SCENE[@CAMERA]")]
     pub scene: Option<StudyScene>,
-    /// What to measure [default: all but features]
+    /// What to measure [default: rays, modes, edits and start]
     #[arg(long, value_enum, value_delimiter = ',', value_name = "PART,...")]
     pub only: Vec<Part>,
     /// Write all raw numbers to this file; of other scenes and parts it keeps what it holds
@@ -79,6 +79,8 @@ pub enum Part {
     Start,
     /// What every feature of the kernels costs where the scene does not need it
     Features,
+    /// Nothing: the report is made of what the file holds
+    Report,
 }
 
 impl Part {
@@ -93,6 +95,7 @@ impl Part {
             Self::Edits => "edits",
             Self::Start => "start",
             Self::Features => "features",
+            Self::Report => "report",
         }
     }
 }

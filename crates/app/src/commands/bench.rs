@@ -41,6 +41,10 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<()> {
         check_writable(path)?;
     }
     let mut kept = args.json.as_deref().map_or_else(|| Ok(empty()), read)?;
+    if args.parts().contains(&Part::Report) {
+        let folder = args.report.as_deref().context("--only report needs --report")?;
+        return page::write(folder, &kept);
+    }
     let gpu = Gpu::headless(&args.adapter.clone().map_or(AdapterSelect::Auto, AdapterSelect::Named))?;
     let subject = Subject::open(args)?;
     let mut here = json!({});
@@ -54,6 +58,7 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<()> {
             Part::Edits => edits::measure(&gpu, args, &subject)?,
             Part::Start => start::measure(args)?,
             Part::Features => features::measure(&gpu, args, &subject)?,
+            Part::Report => continue,
         };
         for (name, value) in Provenance::on(&gpu).fields() {
             found[name] = value.into();

@@ -81,6 +81,10 @@ fn the_built_in_scene_is_measured_part_by_part() {
     }
     let page = std::fs::read_to_string(pages.join("speed.md")).unwrap();
     assert!(page.contains("What was asked for") && !page.contains("NaN"), "{page}");
+    // The same page again, of the numbers alone.
+    std::fs::remove_file(pages.join("speed.md")).unwrap();
+    assert!(fovea(&["bench", "--only", "report", "--json", text(&file), "--report", text(&pages)]).status.success());
+    assert_eq!(std::fs::read_to_string(pages.join("speed.md")).unwrap(), page);
     assert!(["speed-rays.svg", "speed-modes.svg"].iter().all(|plot| pages.join(plot).exists()));
 }
 
@@ -95,6 +99,7 @@ fn a_bench_of_what_is_not_there_is_refused() {
     refuses(&["bench", "--rays", "1000000"], &["--rays"]);
     refuses(&["bench", "--only", "everything"], &["--only"]);
     refuses(&["bench", "--report", "here"], &["--json"]);
+    refuses(&["bench", "--only", "report"], &["--report"]);
     refuses(&["bench", "--adapter", "abacus"], &["abacus"]);
     refuses(&["bench", "--json", text(&other)], &["other.json", "fovea bench"]);
     assert_eq!(std::fs::read_to_string(&other).unwrap(), "[1, 2]");

@@ -27,6 +27,7 @@ pub fn text(raw: &Value) -> String {
             Part::Edits => "\n## Edits and looks\n\n",
             Part::Start => "\n## Start to the first picture\n\n",
             Part::Features => "\n## Features that a scene does not need\n\n",
+            Part::Report => "",
         };
         text += &provenance(&scenes);
         text += &match part {
@@ -35,6 +36,7 @@ pub fn text(raw: &Value) -> String {
             Part::Edits => edits(&scenes),
             Part::Start => start(&scenes),
             Part::Features => features(&scenes),
+            Part::Report => String::new(),
         };
     }
     text
