@@ -14,7 +14,7 @@ use super::subject::{Picture, Subject};
 use crate::cli::bench::BenchArgs;
 use crate::commands::study::plan::{FOVEA_DEG, Method, Place};
 
-/// Samples between an edit and the picture.
+/// Samples between an edit and the picture, clipped to the view as in the window.
 const SAMPLES: u32 = 1 << 13;
 
 /// Seconds from each edit to a presented picture of samples traced after it, and how many of them are in the foveal disc.
@@ -26,6 +26,7 @@ pub fn measure(gpu: &Gpu, args: &BenchArgs, subject: &Subject) -> anyhow::Result
     let (mut renderer, _) = subject.renderer(gpu, args, &scene)?;
     let place = subject.places.first().context("no gaze")?;
     let picture = Picture::new(gpu, place);
+    renderer.set_distribution(subject.distribution(Method::FvClip, place))?;
     renderer.trace(SAMPLES)?;
     picture.draw(&mut renderer)?;
 
@@ -74,7 +75,7 @@ fn looks_elsewhere(
         let picture = Picture::new(gpu, place);
         gpu.wait()?;
         let started = Instant::now();
-        renderer.set_distribution(subject.distribution(Method::Fv, place))?;
+        renderer.set_distribution(subject.distribution(Method::FvClip, place))?;
         renderer.trace(SAMPLES)?;
         picture.draw(renderer)?;
         seconds.push(started.elapsed().as_secs_f64());
