@@ -15,6 +15,7 @@ use fovea_tests::{
 };
 use glam::{Affine3A, DAffine3, DVec3, Quat, Vec3};
 use tracer::{
+    bvh::HierarchyKind,
     distribution::Distribution,
     film::FilmOptions,
     kernels::FILM_WORDS,
@@ -99,13 +100,14 @@ const BODY: &str = "
         radiance.z = 15.0;
     }";
 
-/// Nearest hits of all rays: distance in units of the direction, triangle, instance.
-fn hits(scene: &Scene) -> Vec<Option<(f64, u32, u32)>> {
+/// Nearest hits of all rays by one kind of hierarchy: distance in units of the direction, triangle, instance.
+fn hits(scene: &Scene, kind: HierarchyKind) -> Vec<Option<(f64, u32, u32)>> {
     let gpu = device::gpu();
     let options = RendererOptions { film: FILM, ..Default::default() };
     let mut renderer = Renderer::new(&gpu, &options, Distribution::omnidirectional(device::inverse())).unwrap();
     let sources = instead_of_paths(renderer.shaders(), IMPORTS, ITEMS, BODY);
     renderer.set_shaders(sources).unwrap();
+    renderer.set_hierarchy(kind);
     renderer.set_scene(scene).unwrap();
     let film = device::trace(&mut renderer, FILM.pixels()).unwrap();
     assert_eq!(renderer.statistics().unwrap().clamped, 0, "a distance does not fit the film");
@@ -162,7 +164,9 @@ fn certain_meeting(origin: DVec3, direction: DVec3, [a, b, c]: [DVec3; 3]) -> Op
 
 fn check(name: &str, scene: &Scene) {
     let _time = device::Stopwatch::start("brute force");
-    compare(name, scene, &hits(scene));
+    for kind in [HierarchyKind::Wide, HierarchyKind::Binary] {
+        compare(&format!("{name}, {kind:?}"), scene, &hits(scene, kind));
+    }
 }
 
 fn compare(name: &str, scene: &Scene, found: &[Option<(f64, u32, u32)>]) {
@@ -306,7 +310,7 @@ fn a_lost_triangle_is_noticed() {
     let mesh = builder.triangles(&soup(20, 0.5, 9), &[]);
     builder.place(mesh, material, Affine3A::IDENTITY);
     let mut scene = builder.build();
-    let found = hits(&scene);
+    let found = hits(&scene, HierarchyKind::Wide);
     let wall = [Vec3::new(-9.0, -9.0, -3.0), Vec3::new(9.0, -9.0, -3.0), Vec3::new(0.0, 9.0, -3.0)];
     let mut with_wall = (*scene.meshes[0]).clone();
     let first = with_wall.positions.len() as u32;

@@ -10,12 +10,14 @@ use crate::sampling::Acuity;
 use crate::screen::ScreenGeometry;
 use crate::tev::TevAddress;
 
+pub mod bench;
 pub mod choices;
 pub mod gaze;
 pub mod sampler;
 pub mod study;
 pub mod values;
 
+use bench::BenchArgs;
 use choices::{Clip, EccentricityAt, Geometry, InverseForm, Mode, Model, Orient, Sequence, Show, ToneMapping};
 use gaze::{GazeArgs, PreviewGazeArgs};
 use sampler::SamplerArgs;
@@ -51,6 +53,8 @@ pub enum Command {
     Sampler(SamplerArgs),
     /// Measure how much sooner each mode converges where one looks, scene by scene
     Study(StudyArgs),
+    /// Measure speed: rays, samples, passes, edits and start-up, beside a CPU tracer
+    Bench(BenchArgs),
 }
 
 /// `fovea [SCENE]`.

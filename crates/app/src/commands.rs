@@ -8,6 +8,7 @@ use serde_json::Value;
 use crate::cli::{Cli, Command};
 
 pub mod adapters;
+pub mod bench;
 pub mod gaze;
 pub mod info;
 pub mod merge;
@@ -29,6 +30,7 @@ pub fn run(cli: Cli) -> anyhow::Result<()> {
         Some(Command::Gaze(args)) => gaze::run(&args),
         Some(Command::Sampler(args)) => sampler::run(&args),
         Some(Command::Study(args)) => study::run(&args),
+        Some(Command::Bench(args)) => bench::run(&args),
     }
 }
 

@@ -17,6 +17,7 @@ pub mod output;
 pub mod pick;
 pub mod preferences;
 pub mod preview;
+pub mod process;
 pub mod readback;
 pub mod recent;
 pub mod reload;

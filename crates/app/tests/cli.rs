@@ -7,6 +7,8 @@ use std::process::Command;
 use fovea_app::output::exr::{self, FilmFile};
 use support::{Folder, SQUARE, fovea, json, refuses, text};
 
+#[path = "cli/bench.rs"]
+mod bench;
 mod support;
 
 #[test]

@@ -1,23 +1,75 @@
-//! Two-level bounding volume hierarchy: one obvhs CWBVH per mesh, one over the instances.
+//! Two-level bounding volume hierarchy by obvhs: one per mesh, one over the instances.
 
 use std::sync::Arc;
 
 use glam::{Affine3A, Vec3, Vec3A};
 use obvhs::{
-    BvhBuildParams,
+    Boundable, BvhBuildParams,
     aabb::Aabb,
+    bvh2::builder::build_bvh2,
     cwbvh::{CwBvh, builder::build_cwbvh, node::CwBvhNode},
     triangle::Triangle,
 };
 
+use crate::gpu::Gpu;
+
+mod binary;
+
 /// Bytes of a node on the GPU.
-pub const NODE_BYTES: usize = size_of::<CwBvhNode>();
+pub const NODE_BYTES: usize = size_of::<Node>();
+
+/// A node as the kernels read it, of either kind of hierarchy: a CWBVH's, or a pair of children.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Node([u32; 20]);
+
+const _: () = assert!(size_of::<CwBvhNode>() == size_of::<Node>());
+
+/// How many children a node has. Rays meet the same in both.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum HierarchyKind {
+    /// Eight, compressed (CWBVH, Ylitie et al. 2017): few loads, much arithmetic for each.
+    #[default]
+    Wide,
+    /// Two, as they are: for adapters on which arithmetic on packed bytes is slow.
+    Binary,
+}
+
+impl HierarchyKind {
+    /// What measured faster on adapters of this kind (docs/ARCHITECTURE.md).
+    pub fn preferred_on(gpu: &Gpu) -> Self {
+        if gpu.info().name.contains("SwiftShader") { Self::Binary } else { Self::Wide }
+    }
+
+    /// Builds over primitives: nodes, leaf order, bounds and levels.
+    fn build<T: Boundable>(self, primitives: &[T]) -> Built {
+        let mut build_time = std::time::Duration::default();
+        match self {
+            Self::Wide => {
+                let bvh = build_cwbvh(primitives, build_params(), &mut build_time);
+                let nodes = bytemuck::cast_slice(&bvh.nodes).to_vec();
+                Built { nodes, depth: depth(&bvh), bounds: bvh.total_aabb, order: bvh.primitive_indices }
+            }
+            Self::Binary => binary::encode(build_bvh2(primitives, build_params(), &mut build_time)),
+        }
+    }
+}
+
+/// A hierarchy in the kernels' layout.
+struct Built {
+    nodes: Vec<Node>,
+    order: Vec<u32>,
+    bounds: Aabb,
+    depth: u32,
+}
 
 /// The hierarchy of one mesh: its nodes, and its triangles in the order of the leaves.
 #[derive(Debug)]
 pub struct Blas {
+    /// What its nodes are.
+    pub kind: HierarchyKind,
     /// Indices of children and primitives count from zero.
-    pub nodes: Vec<CwBvhNode>,
+    pub nodes: Vec<Node>,
     /// Leaf order to index of the triangle it was built from.
     pub triangle_order: Vec<u32>,
     /// Bounds in mesh space.
@@ -30,7 +82,7 @@ pub struct Blas {
 #[derive(Debug)]
 pub struct Tlas {
     /// Indices of children and primitives count from zero.
-    pub nodes: Vec<CwBvhNode>,
+    pub nodes: Vec<Node>,
     /// Leaf order to index of the entry it was built from.
     pub order: Vec<u32>,
     /// Levels of nodes, at least 1.
@@ -50,7 +102,7 @@ pub struct TlasEntry {
 
 impl Blas {
     /// Builds the hierarchy of an indexed triangle list. Triangles are not split, so each appears once.
-    pub fn build(positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+    pub fn build(kind: HierarchyKind, positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
         let triangles: Vec<Triangle> = triangles
             .iter()
             .map(|corners| {
@@ -58,21 +110,21 @@ impl Blas {
                 Triangle { v0, v1, v2 }
             })
             .collect();
-        let bvh = build_cwbvh(&triangles, build_params(), &mut std::time::Duration::default());
-        Self { bounds: bvh.total_aabb, depth: depth(&bvh), nodes: bvh.nodes, triangle_order: bvh.primitive_indices }
+        let Built { nodes, order, bounds, depth } = kind.build(&triangles);
+        Self { kind, nodes, triangle_order: order, bounds, depth }
     }
 }
 
 impl Tlas {
     /// Builds the hierarchy over placed ones.
-    pub fn build(entries: &[TlasEntry]) -> Self {
+    pub fn build(kind: HierarchyKind, entries: &[TlasEntry]) -> Self {
         if entries.is_empty() {
-            return Self { nodes: vec![CwBvhNode::default()], order: Vec::new(), depth: 1 };
+            return Self { nodes: vec![Node::default()], order: Vec::new(), depth: 1 };
         }
         let bounds: Vec<Aabb> =
             entries.iter().map(|entry| transformed_bounds(&entry.blas.bounds, &entry.world_from_mesh)).collect();
-        let bvh = build_cwbvh(&bounds, build_params(), &mut std::time::Duration::default());
-        Self { depth: depth(&bvh), nodes: bvh.nodes, order: bvh.primitive_indices }
+        let Built { nodes, order, depth, .. } = kind.build(&bounds);
+        Self { nodes, order, depth }
     }
 }
 
@@ -105,10 +157,16 @@ fn depth(bvh: &CwBvh) -> u32 {
 }
 
 /// Shifts a hierarchy's indices so that it can stand among others in one buffer.
-pub fn rebased(nodes: &[CwBvhNode], node_base: u32, primitive_base: u32) -> impl Iterator<Item = CwBvhNode> {
-    nodes.iter().map(move |node| CwBvhNode {
-        child_base_idx: node.child_base_idx + node_base,
-        primitive_base_idx: node.primitive_base_idx + primitive_base,
-        ..*node
+pub fn rebased(kind: HierarchyKind, nodes: &[Node], node_base: u32, primitive_base: u32) -> impl Iterator<Item = Node> {
+    nodes.iter().map(move |node| match kind {
+        HierarchyKind::Wide => {
+            let node: CwBvhNode = bytemuck::cast(*node);
+            bytemuck::cast(CwBvhNode {
+                child_base_idx: node.child_base_idx + node_base,
+                primitive_base_idx: node.primitive_base_idx + primitive_base,
+                ..node
+            })
+        }
+        HierarchyKind::Binary => binary::rebased(*node, node_base, primitive_base),
     })
 }

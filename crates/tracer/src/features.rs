@@ -28,6 +28,8 @@ macro_rules! features {
 features! {
     /// Some mesh is placed often and has a hierarchy of its own below an upper level.
     Instances = "INSTANCES",
+    /// Nodes of the hierarchies have two children instead of eight.
+    BinaryNodes = "BINARY_NODES",
     /// Some instance has alpha mask or blend: candidates pass an alpha test.
     Alpha = "ALPHA",
     /// Some material has a texture.
@@ -86,6 +88,7 @@ impl Feature {
         !matches!(
             self,
             Self::Instances
+                | Self::BinaryNodes
                 | Self::EnvironmentImage
                 | Self::PerspectiveFilm
                 | Self::LightSamplingOnly

@@ -23,8 +23,10 @@ pub use options::{
 pub use panorama::Refreshed;
 pub use query::{Query, QueryAnswer, RayKind};
 pub use restore::RestoreError;
+pub use timing::BatchSeconds;
 
 use crate::{
+    bvh::HierarchyKind,
     distribution::Distribution,
     features::{Feature, SceneFeatures},
     film::{Film, FilmMapping, FilmOptions, FilmPixel, LAST_SAMPLE, PixelsNear, ReadError, SampleRange},
@@ -135,7 +137,7 @@ impl Renderer {
             gpu: gpu.clone(),
             options: *options,
             film,
-            cache: SceneCache::default(),
+            cache: SceneCache::new(HierarchyKind::preferred_on(gpu)),
             scene: None,
             pose: FilmPose::default(),
             distribution,
@@ -155,6 +157,18 @@ impl Renderer {
         };
         renderer.upload_pixel_list();
         Ok(renderer)
+    }
+
+    /// Builds hierarchies of another kind than what measured faster on the adapter, from the next scene on.
+    pub fn set_hierarchy(&mut self, kind: HierarchyKind) {
+        if self.cache.hierarchy() != kind {
+            self.cache = SceneCache::new(kind);
+        }
+    }
+
+    /// What the hierarchies are.
+    pub fn hierarchy(&self) -> HierarchyKind {
+        self.cache.hierarchy()
     }
 
     /// Uploads a scene version, compiles its kernels and restarts the film.

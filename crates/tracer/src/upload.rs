@@ -7,7 +7,7 @@ use thiserror::Error;
 use wgpu::util::DeviceExt;
 
 use crate::{
-    bvh::NODE_BYTES,
+    bvh::{HierarchyKind, NODE_BYTES},
     features::{Feature, SceneFeatures},
     gpu::Gpu,
     kernels::KernelConstants,
@@ -63,7 +63,9 @@ pub struct UploadReport {
     pub upload_secs: f64,
     /// Bytes of buffers and textures on the device.
     pub device_bytes: u64,
-    /// Bytes of those that were handed over now; the rest was there since an earlier version of the scene.
+    /// Bytes of those that hold hierarchies, corners, triangles and vertices.
+    pub geometry_bytes: u64,
+    /// Bytes of the whole that were handed over now; the rest was there since an earlier version of the scene.
     pub uploaded_bytes: u64,
     /// Triangles in the hierarchies, each mesh once.
     pub triangles: u64,
@@ -207,7 +209,7 @@ impl SceneOnGpu {
         let split = cache.split(scene);
         let shapes = cache.shapes(scene, &split, &mut uploader)?;
         let shapes_secs = started.elapsed().as_secs_f64();
-        let mut placement = Placement::of(scene, &split, &shapes.shapes, shapes.node_count);
+        let mut placement = Placement::of(scene, &split, cache.hierarchy(), &shapes.shapes, shapes.node_count);
         let light_table = lights::LightTable::build(scene, &shapes.shapes, &mut placement);
         let texels = cache.texels(scene, &mut uploader)?;
         let (materials, slots) = materials::encode(scene, &texels.offsets);
@@ -231,6 +233,7 @@ impl SceneOnGpu {
             cache.table("texture slots", &slots, &mut uploader)?,
             cache.table("lights", &light_table.lights, &mut uploader)?,
         ];
+        let geometry_bytes = buffers[..4].iter().map(wgpu::Buffer::size).sum();
         if pollster::block_on(scope.pop()).is_some() {
             return Err(UploadError::OutOfMemory { what: "buffers and textures", bytes: uploader.device_bytes });
         }
@@ -247,7 +250,8 @@ impl SceneOnGpu {
         Ok(Self {
             features: features
                 .with(Feature::Lights, light_count > 0)
-                .with(Feature::Instances, !placement.is_single_level),
+                .with(Feature::Instances, !placement.is_single_level)
+                .with(Feature::BinaryNodes, cache.hierarchy() == HierarchyKind::Binary),
             constants: KernelConstants {
                 stack_size: placement.stack_size,
                 root_node: placement.root,
@@ -281,6 +285,7 @@ impl SceneOnGpu {
                 bvh_build_secs: shapes_secs,
                 upload_secs: started.elapsed().as_secs_f64() - shapes_secs,
                 device_bytes: uploader.device_bytes,
+                geometry_bytes,
                 uploaded_bytes: uploader.uploaded_bytes,
                 triangles: shapes.shapes.triangles.len() as u64,
                 lights: light_count,

@@ -1,6 +1,7 @@
 //! Options with a syntax of their own. Angles are degrees here and become radians where they are used.
 
 use std::convert::Infallible;
+use std::fmt;
 use std::str::FromStr;
 
 use crate::view::FOV_RANGE_DEG;
@@ -157,6 +158,15 @@ impl FromStr for CameraChoice {
 
     fn from_str(text: &str) -> Result<Self, Infallible> {
         Ok(text.parse().map_or_else(|_| Self::Name(text.to_owned()), Self::Index))
+    }
+}
+
+impl fmt::Display for CameraChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Index(index) => write!(f, "{index}"),
+            Self::Name(name) => f.write_str(name),
+        }
     }
 }
 

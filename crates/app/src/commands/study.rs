@@ -15,19 +15,19 @@ use bench::Bench;
 use rates::Rates;
 
 mod analysis;
-mod bench;
+pub(super) mod bench;
 mod curves;
 mod error;
 mod figure;
 mod flip;
 mod observer;
 mod picture;
-mod plan;
-mod plot;
+pub(super) mod plan;
+pub(super) mod plot;
 mod rates;
 mod record;
 mod report;
-mod statistics;
+pub(super) mod statistics;
 mod tables;
 
 /// Carries out a study, or goes on with one.

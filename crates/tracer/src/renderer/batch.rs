@@ -149,24 +149,29 @@ impl Renderer {
 impl BoundKernels {
     /// One batch: trace, then add to every slab.
     pub(super) fn record(&self, encoder: &mut wgpu::CommandEncoder, samples: u32) {
-        let workgroups = workgroups(samples);
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-            label: Some(self.trace.label()),
-            timestamp_writes: None,
-        });
-        self.trace.dispatch(&mut pass, &[&self.trace_groups[0], &self.trace_groups[1]], workgroups);
-        for group in &self.accumulate_groups {
-            self.accumulate.dispatch(&mut pass, &[group], workgroups);
-        }
+        let mut pass = self.pass(encoder);
+        self.trace_in(&mut pass, samples);
+        self.accumulate_in(&mut pass, samples);
     }
 
     /// Traces without adding to the film: the records are for the host.
     pub(super) fn record_paths(&self, encoder: &mut wgpu::CommandEncoder, samples: u32) {
-        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-            label: Some(self.trace.label()),
-            timestamp_writes: None,
-        });
-        self.trace.dispatch(&mut pass, &[&self.trace_groups[0], &self.trace_groups[1]], workgroups(samples));
+        self.trace_in(&mut self.pass(encoder), samples);
+    }
+
+    pub(super) fn trace_in(&self, pass: &mut wgpu::ComputePass<'_>, samples: u32) {
+        self.trace.dispatch(pass, &[&self.trace_groups[0], &self.trace_groups[1]], workgroups(samples));
+    }
+
+    pub(super) fn accumulate_in(&self, pass: &mut wgpu::ComputePass<'_>, samples: u32) {
+        for group in &self.accumulate_groups {
+            self.accumulate.dispatch(pass, &[group], workgroups(samples));
+        }
+    }
+
+    fn pass<'a>(&self, encoder: &'a mut wgpu::CommandEncoder) -> wgpu::ComputePass<'a> {
+        let label = Some(self.trace.label());
+        encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label, timestamp_writes: None })
     }
 }
 

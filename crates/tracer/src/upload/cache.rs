@@ -15,6 +15,7 @@ use super::{
     texels::TexelHeap,
 };
 use crate::{
+    bvh::HierarchyKind,
     features::SceneFeatures,
     scene::{ContentHash, Environment, Scene},
 };
@@ -46,6 +47,7 @@ struct Seen {
 /// Parts of the last scene version on the device, by content, and hierarchies.
 #[derive(Debug, Default)]
 pub struct SceneCache {
+    hierarchy: HierarchyKind,
     blas: BlasCache,
     shapes: Option<(ContentHash, Arc<ShapesOnGpu>)>,
     texels: Option<(ContentHash, Arc<TexelHeap>)>,
@@ -58,6 +60,16 @@ pub struct SceneCache {
 }
 
 impl SceneCache {
+    /// Nothing yet; hierarchies will be of this kind.
+    pub fn new(hierarchy: HierarchyKind) -> Self {
+        Self { hierarchy, ..Self::default() }
+    }
+
+    /// What its hierarchies are.
+    pub fn hierarchy(&self) -> HierarchyKind {
+        self.hierarchy
+    }
+
     /// Which instances join the static mesh; instances that differ from the last version do not.
     pub(super) fn split(&mut self, scene: &Scene) -> Split {
         let now = scene.instances.iter().map(|instance| Seen {
@@ -96,7 +108,7 @@ impl SceneCache {
         }
         // Not both on the device at once.
         self.shapes = None;
-        let mut shapes = Shapes::build(scene, split, &mut self.blas);
+        let mut shapes = Shapes::build(scene, split, self.hierarchy, &mut self.blas);
         let before = uploader.device_bytes;
         let buffers = [
             uploader.storage("hierarchy nodes", &shapes.nodes)?,

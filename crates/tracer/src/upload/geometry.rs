@@ -7,12 +7,11 @@
 use std::{collections::HashMap, sync::Arc};
 
 use glam::Vec3;
-use obvhs::cwbvh::node::CwBvhNode;
 use rayon::prelude::*;
 
 use super::vertices;
 use crate::{
-    bvh::{Blas, rebased},
+    bvh::{Blas, HierarchyKind, Node, rebased},
     kernels::layout::{self, codes},
     scene::{AlphaMode, ContentHash, Instance, Mesh, Scene},
 };
@@ -55,7 +54,7 @@ pub(super) struct PlacedBlas {
 /// Shapes in the kernels' layout.
 #[derive(Debug)]
 pub(super) struct Shapes {
-    pub nodes: Vec<CwBvhNode>,
+    pub nodes: Vec<Node>,
     /// Nine coordinates a triangle, in leaf order.
     pub positions: Vec<[f32; 9]>,
     /// Per triangle: its three vertices, and its number in its mesh with [`codes::TRIANGLE_ALPHA`].
@@ -113,12 +112,12 @@ impl Split {
 }
 
 impl Shapes {
-    pub(super) fn build(scene: &Scene, split: &Split, cache: &mut BlasCache) -> Self {
+    pub(super) fn build(scene: &Scene, split: &Split, kind: HierarchyKind, cache: &mut BlasCache) -> Self {
         let mut pieces: Vec<Piece> = split.meshes.par_iter().map(|&m| own_piece(scene, m)).collect();
         if !split.fixed.is_empty() {
             pieces.push(static_piece(scene, &split.fixed, split.first_part()));
         }
-        let blas = build_hierarchies(&pieces, cache);
+        let blas = build_hierarchies(&pieces, kind, cache);
         let mut shapes = Self {
             nodes: Vec::with_capacity(blas.iter().map(|b| b.nodes.len()).sum()),
             positions: Vec::with_capacity(blas.iter().map(|b| b.triangle_order.len()).sum()),
@@ -142,7 +141,7 @@ impl Shapes {
     fn push_piece(&mut self, piece: &Piece, blas: Arc<Blas>) {
         let root = self.nodes.len() as u32;
         let first_vertex = self.vertices.len() as u32;
-        self.nodes.extend(rebased(&blas.nodes, root, self.triangles.len() as u32));
+        self.nodes.extend(rebased(blas.kind, &blas.nodes, root, self.triangles.len() as u32));
         for &t in &blas.triangle_order {
             let corners = piece.triangles[t as usize];
             let mut flat = [0.0; 9];
@@ -161,12 +160,11 @@ impl Shapes {
 }
 
 /// The pieces' hierarchies; builds those that are new on all cores and forgets unused ones.
-fn build_hierarchies(pieces: &[Piece], cache: &mut BlasCache) -> Vec<Arc<Blas>> {
+fn build_hierarchies(pieces: &[Piece], kind: HierarchyKind, cache: &mut BlasCache) -> Vec<Arc<Blas>> {
     let known = &*cache;
-    let blas: Vec<Arc<Blas>> = pieces
-        .par_iter()
-        .map(|p| known.get(&p.hash).cloned().unwrap_or_else(|| Arc::new(Blas::build(&p.positions, &p.triangles))))
-        .collect();
+    let build = |p: &Piece| Arc::new(Blas::build(kind, &p.positions, &p.triangles));
+    let blas: Vec<Arc<Blas>> =
+        pieces.par_iter().map(|p| known.get(&p.hash).cloned().unwrap_or_else(|| build(p))).collect();
     *cache = pieces.iter().zip(&blas).map(|(piece, blas)| (piece.hash, blas.clone())).collect();
     blas
 }

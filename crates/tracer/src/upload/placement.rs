@@ -1,11 +1,10 @@
 //! Where instances are placed: the upper level of the hierarchy and the instance table.
 
 use glam::{Affine3A, Mat3A};
-use obvhs::cwbvh::node::CwBvhNode;
 
 use super::geometry::{Shapes, Split};
 use crate::{
-    bvh::{Tlas, TlasEntry, rebased},
+    bvh::{HierarchyKind, Node, Tlas, TlasEntry, rebased},
     kernels::layout::{self, codes},
     scene::{Instance, Scene},
 };
@@ -13,7 +12,7 @@ use crate::{
 /// Instances in the kernels' layout.
 pub(super) struct Placement {
     /// Of the upper level; they stand behind the shapes' nodes, from `root` on.
-    pub nodes: Vec<CwBvhNode>,
+    pub nodes: Vec<Node>,
     /// Entries of the upper level in leaf order, room for the hidden ones, then the parts of the static mesh.
     pub instances: Vec<layout::Instance>,
     /// Scene instance of each entry; `None` for the static mesh as a whole and for hidden ones.
@@ -27,7 +26,7 @@ pub(super) struct Placement {
 }
 
 impl Placement {
-    pub(super) fn of(scene: &Scene, split: &Split, shapes: &Shapes, shape_nodes: u32) -> Self {
+    pub(super) fn of(scene: &Scene, split: &Split, kind: HierarchyKind, shapes: &Shapes, shape_nodes: u32) -> Self {
         let visible = split.placed.iter().copied().filter(|&i| scene.instances[i as usize].visible);
         let mut roots = Vec::new();
         let mut entries = Vec::new();
@@ -44,7 +43,7 @@ impl Placement {
             roots.push(piece.root);
             entries.push(TlasEntry { world_from_mesh: Affine3A::IDENTITY, blas: piece.blas.clone(), source: None });
         }
-        let tlas = Tlas::build(&entries);
+        let tlas = Tlas::build(kind, &entries);
         let deepest = shapes.pieces.iter().map(|piece| piece.blas.depth).max().unwrap_or(1);
         let is_single_level = split.placed.is_empty() && !split.fixed.is_empty();
         let mut placement = Self {
@@ -69,7 +68,7 @@ impl Placement {
         }
         if !is_single_level {
             placement.root = rounded_up(shape_nodes);
-            placement.nodes = rebased(&tlas.nodes, placement.root, 0).collect();
+            placement.nodes = rebased(kind, &tlas.nodes, placement.root, 0).collect();
             // Each level leaves at most one group behind, and entering a mesh leaves two.
             placement.stack_size = (tlas.depth + deepest + 2).next_multiple_of(4);
         }

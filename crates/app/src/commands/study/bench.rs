@@ -14,10 +14,10 @@ use tracer::view::{DebugView, ToneMap, ViewProjection, ViewSettings};
 use super::error::Rgb;
 use super::plan::{self, Method, Place};
 use crate::cli::study::{StudyArgs, StudyScene};
-use crate::cli::{FileArgs, SceneArgs};
+use crate::cli::{FileArgs, SceneArgs, values};
 use crate::commands::render::follow;
 use crate::readback;
-use crate::session::{self, Source};
+use crate::session::{self, Source, Viewpoint};
 
 /// A view's picture as the artist sees it.
 #[derive(Clone, Debug)]
@@ -49,21 +49,7 @@ impl Bench {
     /// # Errors
     /// When the scene cannot be read or does not fit the adapter.
     pub fn new(gpu: &Gpu, args: &StudyArgs, scene: Option<&StudyScene>) -> anyhow::Result<Self> {
-        let name = scene.map_or_else(|| "builtin".into(), scene_name);
-        let scene_args = SceneArgs {
-            scene: scene.map(|scene| scene.path.clone()),
-            camera: scene.and_then(|scene| scene.camera.clone()),
-            background: args.background,
-            backdrop: None,
-            env: None,
-            env_rotate: 0.0,
-            sun_angle: 0.0,
-            file: FileArgs::default(),
-            adapter: None,
-        };
-        let loaded = session::load(&Source::from(scene_args.scene.as_deref()), &scene_args)?.scene;
-        let viewpoints = session::viewpoints(&loaded);
-        let camera = &viewpoints[session::choose(&viewpoints, scene_args.camera.as_ref())?];
+        let Opened { name, scene: loaded, camera } = open(scene, args.background)?;
         let film = FilmOptions::equirect(args.film.width, args.film.height);
         let places = plan::gazes(args, &name).into_iter().map(|gaze| Place::new(gaze, camera.rotation)).collect();
         let inverses = [Method::Fv.inverse()?, Method::FvEq6.inverse()?];
@@ -153,7 +139,41 @@ impl Bench {
     }
 }
 
-fn settings(projection: ViewProjection, size: [u32; 2]) -> ViewSettings {
+/// A scene and from where it is seen.
+pub struct Opened {
+    /// File name without its ending.
+    pub name: String,
+    /// The scene.
+    pub scene: Arc<Scene>,
+    /// Where the film is.
+    pub camera: Viewpoint,
+}
+
+/// Reads a scene, or the built-in one, and finds its camera.
+///
+/// # Errors
+/// When it cannot be read or has no such camera.
+pub fn open(scene: Option<&StudyScene>, background: Option<values::Rgb>) -> anyhow::Result<Opened> {
+    let name = scene.map_or_else(|| "builtin".into(), scene_name);
+    let args = SceneArgs {
+        scene: scene.map(|scene| scene.path.clone()),
+        camera: scene.and_then(|scene| scene.camera.clone()),
+        background,
+        backdrop: None,
+        env: None,
+        env_rotate: 0.0,
+        sun_angle: 0.0,
+        file: FileArgs::default(),
+        adapter: None,
+    };
+    let loaded = session::load(&Source::from(args.scene.as_deref()), &args)?.scene;
+    let mut viewpoints = session::viewpoints(&loaded);
+    let chosen = session::choose(&viewpoints, args.camera.as_ref())?;
+    Ok(Opened { name, scene: loaded, camera: viewpoints.swap_remove(chosen) })
+}
+
+/// How a view of the film is drawn.
+pub fn settings(projection: ViewProjection, size: [u32; 2]) -> ViewSettings {
     ViewSettings {
         projection,
         size,

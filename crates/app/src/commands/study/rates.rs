@@ -11,6 +11,7 @@ use super::bench::Bench;
 use super::plan::Method;
 use super::statistics;
 use crate::cli::study::StudyArgs;
+use crate::process::cpu_secs;
 
 /// Rounds over the methods.
 const ROUNDS: u32 = 5;
@@ -65,16 +66,6 @@ pub fn measure(bench: &mut Bench, args: &StudyArgs, rounds: &mut Vec<Round>) -> 
         }
     }
     Ok(())
-}
-
-/// CPU seconds that this process has taken; NaN where the system does not say.
-fn cpu_secs() -> f64 {
-    let Ok(text) = std::fs::read_to_string("/proc/self/stat") else { return f64::NAN };
-    // The second field, the program's name, may hold blanks; it ends with the last parenthesis. User and system time are
-    // fields 14 and 15, in hundredths of a second.
-    let fields = text.rsplit_once(')').map(|(_, rest)| rest.split_whitespace().collect::<Vec<_>>());
-    let ticks = |index: usize| fields.as_ref().and_then(|f| f.get(index)?.parse::<f64>().ok()).unwrap_or(f64::NAN);
-    (ticks(11) + ticks(12)) / 100.0
 }
 
 /// Writes all rounds.
@@ -164,17 +155,5 @@ mod tests {
         assert!((cost.wall - 2e-3).abs() < 1e-12 && (cost.cpu.unwrap() - 2.1e-3).abs() < 1e-12);
         assert_eq!(rates.of("a", "0_0", Method::Od), None);
         assert!(Rates::from_csv("scene\n").is_err());
-    }
-
-    #[cfg(target_os = "linux")]
-    #[test]
-    fn work_takes_processor_time() {
-        let before = cpu_secs();
-        let start = std::time::Instant::now();
-        while start.elapsed().as_secs_f64() < 0.1 {
-            std::hint::black_box(before.sqrt());
-        }
-        let taken = cpu_secs() - before;
-        assert!(taken > 0.0, "{taken}");
     }
 }

@@ -1,0 +1,102 @@
+//! What was asked of the speed, beside what was measured.
+
+use serde_json::Value;
+
+use super::page::{Found, batch_secs, batches, middle, per_second, ratio, row, rows, scenes, table};
+use super::rays::KINDS;
+use crate::cli::bench::Part;
+use crate::commands::study::statistics::geometric_mean;
+
+/// Most of a batch that ray generation may take.
+const GENERATION_SHARE: f64 = 0.03;
+/// Rays a second over those of obvhs.
+const TRAVERSAL: f64 = 0.9;
+/// Segments a second of FV over those of OD.
+const SEGMENTS: f64 = 0.95;
+/// Seconds from an edit to its picture, in the scene that it was asked for.
+const EDIT_SECS: f64 = 0.1;
+/// Samples of that picture in the foveal disc.
+const EDIT_SAMPLES: f64 = 1000.0;
+/// Seconds to the first picture, kernels cached and cold, in the scene that it was asked for.
+const START_SECS: [f64; 2] = [1.0, 2.5];
+/// That scene.
+const SPONZA: &str = "sponza";
+
+/// A table of goals; empty where nothing was measured that one is about.
+pub fn text(raw: &Value) -> String {
+    let mut text = String::new();
+    let mut line = |goal: &str, found: String, is_met: bool| {
+        row(&mut text, &[goal.to_owned(), found, if is_met { "yes" } else { "**no**" }.to_owned()]);
+    };
+    let modes = scenes(raw, Part::Modes);
+    if let Some((scene, mode, share)) = largest_generation(&modes) {
+        let found = format!("at most {:.2} % ({scene}, {})", share * 100.0, mode.to_uppercase());
+        line("ray generation at most 3 % of a batch", found, share <= GENERATION_SHARE);
+    }
+    let traversal = scenes(raw, Part::Rays);
+    if !traversal.is_empty() {
+        for (kind, is_asked) in KINDS.into_iter().zip([true, true, false]) {
+            let ratios: Vec<(f64, &str)> =
+                traversal.iter().map(|(name, found)| (mean_ratio(found, kind), *name)).collect();
+            let found = ratios.iter().map(|(ratio, name)| format!("{name} {ratio:.2}")).collect::<Vec<_>>().join(", ");
+            let is_met = ratios.iter().all(|(ratio, _)| *ratio >= TRAVERSAL);
+            let asked = if is_asked { "at least 0.9" } else { "0.9 as well (not asked for)" };
+            line(&format!("{kind} rays/s over obvhs on the CPU, mean over OD and the gazes: {asked}"), found, is_met);
+        }
+    }
+    if !modes.is_empty() {
+        let ratios: Vec<(f64, &str)> = modes.iter().map(|(name, found)| (fv_over_od(found), *name)).collect();
+        let found = ratios.iter().map(|(ratio, name)| format!("{name} {ratio:.2}")).collect::<Vec<_>>().join(", ");
+        let is_met = ratios.iter().all(|(ratio, _)| *ratio >= SEGMENTS);
+        line("segments/s of FV over OD, mean over the gazes: at least 0.95", found, is_met);
+    }
+    let edits = scenes(raw, Part::Edits);
+    for (name, found) in edits.iter().filter(|(name, _)| *name == SPONZA) {
+        let [material, first, moves] = ["material_s", "first_move_s", "move_s"].map(|what| middle(&found[what]));
+        let in_fovea = found["samples_in_foveal_disc"].as_f64().unwrap_or(0.0);
+        let times = format!(
+            "material {:.0}, first move {:.0}, further moves {:.0} ms",
+            material * 1e3,
+            first * 1e3,
+            moves * 1e3
+        );
+        let is_met = material.max(first).max(moves) <= EDIT_SECS && in_fovea >= EDIT_SAMPLES;
+        let goal = format!("edit to a picture of later samples, 1,000 in the foveal disc, {name}: at most 100 ms");
+        line(&goal, format!("{times}; {in_fovea} samples"), is_met);
+        let look = middle(&found["gaze_s"]) * 1e3;
+        // Nothing restarts or compiles for a gaze: the batch that is recorded next uses it.
+        let found = format!("the next batch: {look:.0} ms with its picture, {name}");
+        line("gaze change to a batch that uses it: one frame", found, look.is_finite());
+    }
+    for (name, found) in scenes(raw, Part::Start).iter().filter(|(name, _)| *name == SPONZA) {
+        for (state, limit) in ["cached", "cold"].into_iter().zip(START_SECS) {
+            let runs = rows(found, state).iter().map(|run| run["process_s"].clone()).collect();
+            let seconds = middle(&Value::Array(runs));
+            let goal = format!("process start to first picture, {name}, kernels {state}: at most {limit:.1} s");
+            line(&goal, format!("{seconds:.2} s"), seconds <= limit);
+        }
+    }
+    if text.is_empty() {
+        text
+    } else {
+        format!("\n## What was asked for\n\n{}{text}", table(&["goal", "found", "met"]))
+    }
+}
+
+fn largest_generation<'a>(modes: &Found<'a>) -> Option<(&'a str, &'a str, f64)> {
+    let share = |batch: &Value| middle(&batch["generate_s"]) / batch_secs(batch);
+    let all = modes.iter().flat_map(|(name, found)| rows(found, "batches").iter().map(move |batch| (*name, batch)));
+    let known = all.map(|(name, batch)| (name, batch["mode"].as_str().unwrap_or_default(), share(batch)));
+    known.filter(|(_, _, share)| share.is_finite()).max_by(|a, b| a.2.total_cmp(&b.2))
+}
+
+/// Geometric mean over OD and all gazes.
+fn mean_ratio(found: &Value, kind: &str) -> f64 {
+    let sets = rows(found, "sets").iter().filter(|set| set["rays"] == kind);
+    geometric_mean(sets.map(ratio)).unwrap_or(f64::NAN)
+}
+
+fn fv_over_od(found: &Value) -> f64 {
+    let pairs = batches(found, "fv").into_iter().zip(batches(found, "od"));
+    geometric_mean(pairs.map(|(fv, od)| per_second(fv, "segments") / per_second(od, "segments"))).unwrap_or(f64::NAN)
+}

@@ -1,0 +1,103 @@
+//! From the start of a process to its first picture: device, import, hierarchies, upload, kernels, a first batch, and its
+//! reconstruction at 1280x720, without a window. Timed from outside, so that loading the program counts.
+
+use std::ffi::OsString;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Instant;
+
+use anyhow::{Context, ensure};
+use serde_json::{Value, json};
+use tracer::gpu::{AdapterSelect, Gpu};
+use tracer::renderer::FIRST_BATCH;
+
+use super::subject::{Picture, Subject};
+use crate::cli::bench::BenchArgs;
+use crate::commands::print_json;
+
+/// Shows the scene once: what the process that is timed does.
+///
+/// # Errors
+/// Bad input, or an adapter that cannot do it.
+pub fn show(args: &BenchArgs) -> anyhow::Result<()> {
+    let started = Instant::now();
+    let mut last = 0.0;
+    let mut since = || {
+        let now = started.elapsed().as_secs_f64();
+        now - std::mem::replace(&mut last, now)
+    };
+    let gpu = Gpu::headless(&args.adapter.clone().map_or(AdapterSelect::Auto, AdapterSelect::Named))?;
+    let device = since();
+    let subject = Subject::open(args)?;
+    let import = since();
+    let (mut renderer, report) = subject.renderer(&gpu, args, &subject.scene)?;
+    let set = since();
+    renderer.trace(FIRST_BATCH)?;
+    gpu.wait()?;
+    let batch = since();
+    let place = subject.places.first().context("no gaze")?;
+    Picture::new(&gpu, place).draw(&mut renderer)?;
+    let picture = since();
+    let compile = report.kernel_compile_secs;
+    print_json(&json!({
+        "device_s": device, "import_s": import, "bvh_build_s": report.upload.bvh_build_secs,
+        "upload_s": report.upload.upload_secs, "kernels_s": compile,
+        "rest_of_scene_s": set - report.upload.bvh_build_secs - report.upload.upload_secs - compile,
+        "first_batch_s": batch, "picture_s": picture,
+    }))
+}
+
+/// Times processes of this program: each first with an empty folder for the driver's cache, then with what it left there.
+///
+/// # Errors
+/// When the program cannot be started.
+pub fn measure(args: &BenchArgs) -> anyhow::Result<Value> {
+    let (mut cold, mut cached) = (Vec::new(), Vec::new());
+    for round in 0..args.rounds {
+        let folder = std::env::temp_dir().join(format!("fovea-bench-cache-{}-{round}", std::process::id()));
+        std::fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+        let times = first_picture(args, &folder).and_then(|first| Ok((first, first_picture(args, &folder)?)));
+        // What stays in the folder for temporary files harms nothing.
+        let _ = std::fs::remove_dir_all(&folder);
+        let (first, second) = times?;
+        cold.push(first);
+        cached.push(second);
+    }
+    Ok(json!({ "cold": cold, "cached": cached }))
+}
+
+/// One process, with its shader cache in `folder` where the driver is Mesa's.
+fn first_picture(args: &BenchArgs, folder: &Path) -> anyhow::Result<Value> {
+    let mut command = Command::new(std::env::current_exe().context("the program's own file")?);
+    command.args(words(args)).stderr(Stdio::null());
+    command.env("MESA_SHADER_CACHE_DIR", folder).env_remove("MESA_SHADER_CACHE_DISABLE");
+    let started = Instant::now();
+    let output = command.output().context("the program itself")?;
+    let seconds = started.elapsed().as_secs_f64();
+    ensure!(output.status.success(), "the process that shows the scene failed");
+    let mut stages: Value = serde_json::from_slice(&output.stdout).context("what that process says")?;
+    stages["process_s"] = seconds.into();
+    Ok(stages)
+}
+
+/// The command line of that process.
+fn words(args: &BenchArgs) -> Vec<OsString> {
+    let mut words: Vec<OsString> = ["bench", "--first-picture"].map(OsString::from).to_vec();
+    if let Some(scene) = &args.scene {
+        let camera = scene.camera.as_ref().map(|camera| format!("@{camera}")).unwrap_or_default();
+        let mut file = scene.path.clone().into_os_string();
+        file.push(camera);
+        words.push(file);
+    }
+    let mut option = |name: &str, value: String| words.extend([name.into(), value.into()]);
+    option("--film", format!("{}x{}", args.film.width, args.film.height));
+    option("--max-bounces", args.max_bounces.to_string());
+    if let Some(background) = args.background {
+        let [r, g, b] = background.0;
+        option("--background", format!("{r},{g},{b}"));
+    }
+    if let Some(adapter) = &args.adapter {
+        option("--adapter", adapter.clone());
+    }
+    words
+}
