@@ -19,7 +19,7 @@ use tracer::{
     renderer::{Renderer, RendererOptions, SequenceKind, StopCondition},
 };
 
-use statistics::{Pixels, Runs};
+use statistics::{Elements, Runs, Truth};
 
 #[path = "adaptive_report/statistics.rs"]
 mod statistics;
@@ -30,8 +30,8 @@ const FILM: FilmOptions = FilmOptions::equirect(512, 256);
 /// What the window has for a view of 1280x720 pixels: the guide's cost is that of its cells there.
 const USUAL_FILM: FilmOptions = FilmOptions::equirect(2048, 1024);
 /// Samples in all at which films are compared, with the seeds that go so far.
-const STOPS: [(u64, u32); 3] = [(1 << 15, 64), (1 << 17, 64), (1 << 19, 12)];
-/// Samples at which the steering film of two buffers is first looked at: as many as one buffer waits for.
+const STOPS: [(u64, u32); 3] = [(1 << 15, 64), (1 << 17, 64), (1 << 19, 8)];
+/// Samples of the steering film of two buffers when it is first looked at: as many as one buffer waits for.
 const FIRST_LOOK: u64 = 1 << 14;
 
 /// How samples are placed.
@@ -111,7 +111,7 @@ impl Films {
         loop {
             let next = StopCondition::Samples(until.min(half));
             self.steering.render(next, |_| true)?;
-            if self.shown.samples() >= FIRST_LOOK / 2 && self.steering.samples() > self.shown.samples() {
+            if self.steering.samples() > self.shown.samples() {
                 let guide = self.steering.measure_guide()?;
                 self.shown.set_guide(guide);
             }
@@ -127,7 +127,7 @@ impl Films {
 fn measure(gpu: &Gpu, subject: &Subject) -> Result<Value, AnyError> {
     let shown = renderer(gpu, subject, FILM)?;
     let mut films = Films { steering: shown.beside(shown.distribution().clone())?, shown };
-    let pixels = Pixels::new(&FILM);
+    let elements = Elements::new(&FILM);
     let mut runs = STOPS.map(|_| Way::ALL.map(|_| Runs::default()));
     for seed in 1..=STOPS[0].1 {
         eprintln!("{}: seed {seed}", subject.name);
@@ -137,20 +137,19 @@ fn measure(gpu: &Gpu, subject: &Subject) -> Result<Value, AnyError> {
             let wanted = STOPS.into_iter().enumerate().filter(|(_, (_, seeds))| seed <= *seeds);
             for (stop, (samples, _)) in wanted {
                 seconds += films.go_on(way, samples)?;
-                runs[stop][way as usize].push(&pixels, &films.shown.snapshot()?, seconds);
+                runs[stop][way as usize].push(&elements, &films.shown.snapshot()?, seconds);
             }
         }
     }
-    let best = &runs[1][0];
-    let truth = best.truth();
     let stops: Vec<Value> = STOPS
         .into_iter()
         .zip(&runs)
         .map(|((samples, seeds), ways)| {
+            let truth = Truth::new(&ways[0], ways);
             let rows: Vec<Value> = Way::ALL
                 .into_iter()
                 .zip(ways)
-                .map(|(way, runs)| runs.to_json(way.name(), &ways[0], &pixels, &truth))
+                .map(|(way, runs)| runs.to_json(way.name(), &ways[0], &elements, &truth))
                 .collect();
             json!({ "samples": samples, "seeds": seeds, "ways": rows })
         })

@@ -1,55 +1,91 @@
-//! Errors and biases over the runs of one way to place samples.
+//! Errors and biases over the runs of the ways to place samples.
+
+use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 use tracer::film::{FilmOptions, FilmSnapshot};
 
 /// Outer edges of the regions about the gaze, degrees; the first is the foveal disc.
 pub const EDGES_DEG: [f64; 3] = [5.79, 15.0, 40.0];
+/// Film pixels along the side of what is compared in each region: single ones where each has samples.
+const SIDES: [u32; 3] = [1, 1, 4];
 /// Part of the mean luminance that is added in the divisor of relative errors, as in the study.
 const DARK_FLOOR: f64 = 0.1;
 /// Part of the largest displayed luminance that the eye adds to what it sees.
 const GLARE: f64 = 0.05;
 
-/// The film's pixels that are looked at.
-pub struct Pixels {
-    /// Index in the film, region, solid angle.
-    list: Vec<(usize, usize, f64)>,
+/// What is compared: a pixel or a square of them.
+struct Element {
+    region: usize,
+    /// Solid angle, in any unit.
+    weight: f64,
+    /// In the film.
+    pixels: Vec<usize>,
 }
 
-impl Pixels {
+/// All that is compared.
+pub struct Elements(Vec<Element>);
+
+impl Elements {
     /// All within the last region.
     pub fn new(film: &FilmOptions) -> Self {
-        let places = (0..film.pixels() as u32).map(|index| (index, super::place(film, index)));
-        let list = places.filter_map(|(index, (degrees, weight))| {
-            let region = EDGES_DEG.iter().position(|edge| degrees < *edge)?;
-            Some((index as usize, region, weight))
-        });
-        Self { list: list.collect() }
+        let mut elements: BTreeMap<(usize, u32, u32), Element> = BTreeMap::new();
+        for index in 0..film.pixels() as u32 {
+            let (degrees, weight) = super::place(film, index);
+            let Some(region) = EDGES_DEG.iter().position(|edge| degrees < *edge) else { continue };
+            let (x, y) = (index % film.width / SIDES[region], index / film.width / SIDES[region]);
+            let element = || Element { region, weight: 0.0, pixels: Vec::new() };
+            let element = elements.entry((region, y, x)).or_insert_with(element);
+            element.weight += weight;
+            element.pixels.push(index as usize);
+        }
+        Self(elements.into_values().collect())
     }
-}
-
-/// What the runs say together, pixel by pixel.
-pub struct Truth {
-    means: Vec<f64>,
-    /// Median luminance, to which the eye is adapted.
-    adaptation: f64,
-    floor: f64,
 }
 
 /// Runs of different seeds.
 #[derive(Default)]
 pub struct Runs {
-    /// Of each run, the pixels' luminance; NaN without a sample.
+    /// Of each run, the elements' luminance; NaN without a sample.
     pictures: Vec<Vec<f32>>,
-    /// Of each run, mean samples of a foveal pixel.
-    foveal_samples: Vec<f64>,
+    /// Of each run, mean samples of a pixel in each region.
+    samples: Vec<[f64; 3]>,
     seconds: Vec<f64>,
 }
 
-/// Mean over what is finite, with how many that are.
-fn finite_mean(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    let (sum, count) = values.filter(|v| v.is_finite()).fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
-    (sum / count, count)
+/// The elements that all runs of all ways know, with what is true there.
+pub struct Truth {
+    /// Place among the elements, mean luminance over the plain runs.
+    known: Vec<(usize, f64)>,
+    /// Median luminance, to which the eye is adapted.
+    adaptation: f64,
+    dark: f64,
+}
+
+impl Truth {
+    /// From the plain way's runs and the others'.
+    pub fn new(plain: &Runs, all: &[Runs]) -> Self {
+        let elements = plain.pictures.first().map_or(0, Vec::len);
+        let is_known = |element: usize| all.iter().all(|way| way.values(element).all(f64::is_finite));
+        let known: Vec<_> =
+            (0..elements).filter(|e| is_known(*e)).map(|e| (e, mean_and_variance(plain.values(e)).0)).collect();
+        let means: Vec<f64> = known.iter().map(|(_, mean)| *mean).collect();
+        let dark = (DARK_FLOOR * mean_and_variance(means.iter().copied()).0).powi(2);
+        Self { adaptation: median(&means), known, dark }
+    }
+
+    /// Luminance as it is displayed, in 0..1.
+    fn displayed(&self, luminance: f64) -> f64 {
+        let x = luminance / self.adaptation;
+        x / (1.0 + x)
+    }
+}
+
+/// Mean, and variance of a single value.
+fn mean_and_variance(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
+    let (sum, count) = values.clone().fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
+    let mean = sum / count;
+    (mean, values.map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0))
 }
 
 fn median(values: &[f64]) -> f64 {
@@ -60,97 +96,76 @@ fn median(values: &[f64]) -> f64 {
 
 impl Runs {
     /// Adds a run.
-    pub fn push(&mut self, pixels: &Pixels, film: &FilmSnapshot, seconds: f64) {
-        let of = |index: usize| {
-            let pixel = film.pixel(index);
-            if pixel.samples > 0 { pixel.luminance() as f32 } else { f32::NAN }
+    pub fn push(&mut self, elements: &Elements, film: &FilmSnapshot, seconds: f64) {
+        let of = |element: &Element| {
+            let pixels = element.pixels.iter().map(|index| film.pixel(*index)).filter(|pixel| pixel.samples > 0);
+            let (sum, count) = pixels.fold((0.0, 0.0), |(sum, count), p| (sum + p.luminance(), count + 1.0));
+            (sum / count) as f32
         };
-        self.pictures.push(pixels.list.iter().map(|(index, _, _)| of(*index)).collect());
-        let fovea = pixels.list.iter().filter(|(_, region, _)| *region == 0);
-        self.foveal_samples.push(finite_mean(fovea.map(|(index, _, _)| f64::from(film.pixel(*index).samples))).0);
+        self.pictures.push(elements.0.iter().map(of).collect());
+        let mut counts = [(0.0, 0.0); 3];
+        for element in &elements.0 {
+            let (sum, pixels) = &mut counts[element.region];
+            *sum += element.pixels.iter().map(|index| f64::from(film.pixel(*index).samples)).sum::<f64>();
+            *pixels += element.pixels.len() as f64;
+        }
+        self.samples.push(counts.map(|(sum, pixels)| sum / pixels));
         self.seconds.push(seconds);
     }
 
-    /// Means over the runs.
-    pub fn truth(&self) -> Truth {
-        let means: Vec<f64> =
-            (0..self.pictures.first().map_or(0, Vec::len)).map(|pixel| self.of_pixel(pixel).0).collect();
-        let adaptation = median(&means.iter().copied().filter(|mean| mean.is_finite()).collect::<Vec<_>>());
-        let floor = (DARK_FLOOR * finite_mean(means.iter().copied()).0).powi(2);
-        Truth { means, adaptation, floor }
-    }
-
-    /// Mean over the runs, variance of a run, and runs that have a sample there.
-    fn of_pixel(&self, pixel: usize) -> (f64, f64, f64) {
-        let values = || self.pictures.iter().map(|picture| f64::from(picture[pixel]));
-        let (mean, count) = finite_mean(values());
-        let squares = values().filter(|v| v.is_finite()).map(|v| (v - mean).powi(2)).sum::<f64>();
-        (mean, squares / (count - 1.0), count)
-    }
-
-    /// Mean luminance of a region, run by run, over its pixels with a sample.
-    fn region_means(&self, pixels: &Pixels, region: usize) -> Vec<f64> {
-        let of = |picture: &Vec<f32>| {
-            let known =
-                pixels.list.iter().zip(picture).filter(|((_, of, _), value)| *of == region && value.is_finite());
-            let (sum, weight) =
-                known.fold((0.0, 0.0), |(s, w), ((_, _, weight), value)| (s + weight * f64::from(*value), w + weight));
-            sum / weight
-        };
-        self.pictures.iter().map(of).collect()
+    /// Of every run.
+    fn values(&self, element: usize) -> impl Iterator<Item = f64> + Clone + '_ {
+        self.pictures.iter().map(move |picture| f64::from(picture[element]))
     }
 
     /// The figures of this way beside the plain one.
-    pub fn to_json(&self, name: &str, plain: &Self, pixels: &Pixels, truth: &Truth) -> Value {
+    pub fn to_json(&self, name: &str, plain: &Self, elements: &Elements, truth: &Truth) -> Value {
         let regions: Vec<Value> =
-            (0..EDGES_DEG.len()).map(|region| self.region(region, plain, pixels, truth)).collect();
-        json!({
-            "way": name,
-            "seconds": median(&self.seconds),
-            "samples_a_foveal_pixel": finite_mean(self.foveal_samples.iter().copied()).0,
-            "regions": regions,
-        })
+            (0..EDGES_DEG.len()).map(|region| self.region(region, plain, elements, truth)).collect();
+        json!({ "way": name, "seconds": median(&self.seconds), "regions": regions })
     }
 
-    fn region(&self, region: usize, plain: &Self, pixels: &Pixels, truth: &Truth) -> Value {
-        // Sums over pixels: weight, relative squared error, the same as displayed, squared bias less its noise and its square.
+    fn region(&self, region: usize, plain: &Self, elements: &Elements, truth: &Truth) -> Value {
+        let known: Vec<(&Element, usize, f64)> = truth
+            .known
+            .iter()
+            .map(|(index, mean)| (&elements.0[*index], *index, *mean))
+            .filter(|(element, _, _)| element.region == region)
+            .collect();
         let (mut weight, mut relative, mut displayed) = (0.0, 0.0, 0.0);
         let mut biases = Vec::new();
-        let chosen = pixels.list.iter().enumerate().filter(|(_, (_, of, _))| *of == region);
-        for (pixel, (_, _, solid_angle)) in chosen {
-            let ((mean, variance, runs), (of_plain, plain_variance, plain_runs)) =
-                (self.of_pixel(pixel), plain.of_pixel(pixel));
-            let expected = truth.means[pixel];
-            // Pixels that some runs have no sample in are not compared.
-            if runs < self.pictures.len() as f64 || plain_runs < plain.pictures.len() as f64 {
-                continue;
-            }
-            let bright = expected / truth.adaptation;
-            let shown = bright / (1.0 + bright);
-            let slope = 1.0 / (truth.adaptation * (1.0 + bright).powi(2));
-            weight += solid_angle;
-            relative += solid_angle * variance / (expected * expected + truth.floor);
-            displayed += solid_angle * variance * (slope / (shown + GLARE)).powi(2);
-            let noise = variance / runs + plain_variance / plain_runs;
-            biases.push(((mean - of_plain).powi(2) - noise) / (expected * expected + truth.floor));
+        for (element, index, expected) in &known {
+            let divisor = expected * expected + truth.dark;
+            let (mean, variance) = mean_and_variance(self.values(*index));
+            let (plain_mean, plain_variance) = mean_and_variance(plain.values(*index));
+            let shown = truth.displayed(*expected);
+            weight += element.weight;
+            relative += element.weight * variance / divisor;
+            displayed += element.weight * mean_and_variance(self.values(*index).map(|v| truth.displayed(v))).1
+                / (shown + GLARE).powi(2);
+            let noise = variance / self.pictures.len() as f64 + plain_variance / plain.pictures.len() as f64;
+            biases.push(((mean - plain_mean).powi(2) - noise) / divisor);
         }
-        let (bias_squared, count) = finite_mean(biases.iter().copied());
-        let spread = biases.iter().map(|b| (b - bias_squared).powi(2)).sum::<f64>() / (count - 1.0);
-        let (ours, theirs) = (self.region_means(pixels, region), plain.region_means(pixels, region));
-        let of_mean = |values: &[f64]| {
-            let (mean, n) = finite_mean(values.iter().copied());
-            (mean, values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0) / n)
+        let (bias_squared, spread) = mean_and_variance(biases.iter().copied());
+        let of_mean = |runs: &Self| {
+            let of_run = |picture: &Vec<f32>| -> f64 {
+                known.iter().map(|(element, index, _)| element.weight * f64::from(picture[*index])).sum()
+            };
+            let (mean, variance) = mean_and_variance(runs.pictures.iter().map(of_run));
+            (mean, variance / runs.pictures.len() as f64)
         };
-        let ((mean, mean_variance), (plain_mean, plain_variance)) = (of_mean(&ours), of_mean(&theirs));
+        let ((mean, mean_variance), (plain_mean, plain_variance)) = (of_mean(self), of_mean(plain));
         json!({
             "within_deg": EDGES_DEG[region],
-            "pixels": count,
+            "elements": known.len(),
+            "pixels_of_an_element": SIDES[region] * SIDES[region],
+            "samples_a_pixel": mean_and_variance(self.samples.iter().map(|run| run[region])).0,
             "relative_squared_error": relative / weight,
             "displayed_squared_error": displayed / weight,
             "bias_of_mean": mean / plain_mean - 1.0,
             "bias_of_mean_standard_error": (mean_variance + plain_variance).sqrt() / plain_mean,
             "pixel_bias_squared": bias_squared,
-            "pixel_bias_squared_standard_error": (spread / count).sqrt(),
+            "pixel_bias_squared_standard_error": (spread / biases.len() as f64).sqrt(),
         })
     }
 }

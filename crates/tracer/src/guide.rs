@@ -41,8 +41,8 @@ pub struct Guide {
 
 impl Guide {
     /// Weights column by column, [`GUIDE_COLUMNS_PER_ROW`] times `rows` columns of `rows` cells; only their ratios count: the
-    /// density becomes [`FLOOR`] plus, in proportion to them, what is left. `None` when the number of weights is another, `rows` is 0, or they are not
-    /// finite and positive.
+    /// density becomes [`FLOOR`] plus, in proportion to them, what is left. `None` when the number of weights is another, `rows`
+    /// is 0, a weight is negative or not finite, or none is positive.
     pub fn from_weights(weights: &[f32], rows: u32) -> Option<Self> {
         let columns = rows.checked_mul(GUIDE_COLUMNS_PER_ROW)?;
         let cells = u64::from(columns) * u64::from(rows);
