@@ -12,7 +12,7 @@ use tracer::{
     gpu::Gpu,
     guide::{FLOOR, GUIDE_COLUMNS_PER_ROW, Guide},
     kernels::ShaderSources,
-    renderer::{Renderer, RendererOptions, SequenceKind, StopCondition},
+    renderer::{FIRST_BATCH, Renderer, RendererOptions, SequenceKind, StopCondition},
 };
 
 const FILM: FilmOptions = FilmOptions::equirect(64, 32);
@@ -205,7 +205,9 @@ fn a_gaze_that_moves_drops_the_guide_and_what_is_known_there_makes_a_new_one() {
     let first = renderer.guide().unwrap().clone();
     renderer.set_distribution(foveated(Vec3::NEG_Z)).unwrap();
     assert!(renderer.guide().is_none(), "it was for another gaze");
-    // The film is there: the noise about the new gaze is judged before the next sample.
+    // The film is there: the noise about the new gaze is judged as soon as the gaze has rested.
+    device::trace(&mut renderer, FIRST_BATCH.into()).unwrap();
+    assert!(renderer.guide().is_none(), "a gaze that moves costs nothing");
     let before = renderer.statistics().unwrap();
     renderer.trace(64).unwrap();
     let second = renderer.guide().unwrap().clone();

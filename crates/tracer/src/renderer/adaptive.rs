@@ -1,6 +1,6 @@
 //! Adaptive sampling: when noise is judged, on the device, and what becomes of it.
 
-use super::{RenderError, Renderer, batch::workgroups};
+use super::{FIRST_BATCH, RenderError, Renderer, batch::workgroups};
 use crate::{
     film::read_buffer,
     guide::{self, GUIDE_COLUMNS_PER_ROW, Guide},
@@ -25,8 +25,8 @@ pub(super) struct Adaptive {
 impl Renderer {
     /// Gives more samples, from now on, to where the film is visibly noisy, or no longer does. The film goes on.
     ///
-    /// Noise is judged when the film holds enough samples about the gaze, and again whenever they have doubled since the
-    /// distribution was set; [`Renderer::trace`] then waits for the device. What is rendered does not depend on the batches. Counts
+    /// Noise is judged when the film holds enough samples about the gaze and the distribution has stayed the same for
+    /// [`FIRST_BATCH`] of them, and again whenever those since then have doubled; [`Renderer::trace`] then waits for the device. What is rendered does not depend on the batches. Counts
     /// that depend on the samples bias the mean, so [`RenderStatistics::steered`](super::RenderStatistics::steered) counts the samples
     /// whose place was chosen so.
     pub fn set_adaptive(&mut self, is_on: bool) {
@@ -95,8 +95,9 @@ impl Renderer {
         }
         let first = guide::first_samples(self.distribution.peak_share(&self.options.film));
         let since = self.adaptive.since;
-        // What the film held before may say enough at once.
-        let next = *self.adaptive.next.get_or_insert(if since >= first { since } else { first });
+        // What the film held before says enough; but a gaze that never rests is not to be judged again and again.
+        let rested = since + u64::from(FIRST_BATCH);
+        let next = *self.adaptive.next.get_or_insert(if since >= first { rested } else { first });
         if self.samples < next {
             return Ok(());
         }
