@@ -136,25 +136,24 @@ impl Runs {
         let mut biases = Vec::new();
         for (element, index, expected) in &known {
             let divisor = expected * expected + truth.dark;
-            let (mean, variance) = mean_and_variance(self.values(*index));
-            let (plain_mean, plain_variance) = mean_and_variance(plain.values(*index));
+            let (_, variance) = mean_and_variance(self.values(*index));
+            // Films of one seed have samples in common: their differences are taken seed by seed.
+            let differences = self.values(*index).zip(plain.values(*index)).map(|(own, plain)| own - plain);
+            let (difference, spread) = mean_and_variance(differences);
             let shown = truth.displayed(*expected);
             weight += element.weight;
             relative += element.weight * variance / divisor;
             displayed += element.weight * mean_and_variance(self.values(*index).map(|v| truth.displayed(v))).1
                 / (shown + GLARE).powi(2);
-            let noise = variance / self.pictures.len() as f64 + plain_variance / plain.pictures.len() as f64;
-            biases.push(((mean - plain_mean).powi(2) - noise) / divisor);
+            biases.push((difference * difference - spread / self.pictures.len() as f64) / divisor);
         }
         let (bias_squared, spread) = mean_and_variance(biases.iter().copied());
-        let of_mean = |runs: &Self| {
-            let of_run = |picture: &Vec<f32>| -> f64 {
-                known.iter().map(|(element, index, _)| element.weight * f64::from(picture[*index])).sum()
-            };
-            let (mean, variance) = mean_and_variance(runs.pictures.iter().map(of_run));
-            (mean, variance / runs.pictures.len() as f64)
+        let of_run = |picture: &Vec<f32>| -> f64 {
+            known.iter().map(|(element, index, _)| element.weight * f64::from(picture[*index])).sum()
         };
-        let ((mean, mean_variance), (plain_mean, plain_variance)) = (of_mean(self), of_mean(plain));
+        let differences = self.pictures.iter().zip(&plain.pictures).map(|(own, plain)| of_run(own) - of_run(plain));
+        let (difference, difference_variance) = mean_and_variance(differences);
+        let (of_plain, _) = mean_and_variance(plain.pictures.iter().map(of_run));
         json!({
             "within_deg": EDGES_DEG[region],
             "elements": known.len(),
@@ -162,8 +161,8 @@ impl Runs {
             "samples_a_pixel": mean_and_variance(self.samples.iter().map(|run| run[region])).0,
             "relative_squared_error": relative / weight,
             "displayed_squared_error": displayed / weight,
-            "bias_of_mean": mean / plain_mean - 1.0,
-            "bias_of_mean_standard_error": (mean_variance + plain_variance).sqrt() / plain_mean,
+            "bias_of_mean": difference / of_plain,
+            "bias_of_mean_standard_error": (difference_variance / self.pictures.len() as f64).sqrt() / of_plain,
             "pixel_bias_squared": bias_squared,
             "pixel_bias_squared_standard_error": (spread / biases.len() as f64).sqrt(),
         })
