@@ -41,8 +41,8 @@ impl Renderer {
         self.adaptive.is_on
     }
 
-    /// Gives the cells of the distribution's unit square other densities, until the distribution, the film or the choice of adaptive
-    /// sampling changes. As long as the guide does not depend on samples of this film, its means stay unbiased.
+    /// Gives the cells of the distribution's unit square other densities, until the film restarts or the distribution or the choice
+    /// of adaptive sampling changes. As long as the guide does not depend on samples of this film, its means stay unbiased.
     pub fn set_guide(&mut self, guide: Option<Guide>) {
         (self.adaptive.guide, self.adaptive.is_own) = (guide, false);
         self.upload_pixel_list();
