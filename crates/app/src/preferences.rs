@@ -36,6 +36,8 @@ pub struct Preferences {
     pub theme: ThemePreference,
     /// How samples are distributed.
     pub mode: Option<Mode>,
+    /// More samples to where the film is noisy.
+    pub adaptive: Option<bool>,
     /// Stops.
     pub exposure_ev: Option<f32>,
     /// From radiance to display values.
@@ -61,6 +63,7 @@ impl Preferences {
         json!({
             "theme": THEMES.iter().find(|entry| entry.0 == self.theme).map(|entry| entry.1),
             "mode": name(self.mode),
+            "adaptive": self.adaptive,
             "exposure_ev": self.exposure_ev,
             "tone_map": name(self.tone_map),
             "panels": panels,
@@ -81,6 +84,7 @@ impl Preferences {
         Self {
             theme: THEMES.iter().find(|entry| value["theme"] == entry.1).map_or_else(Default::default, |entry| entry.0),
             mode: choice(&value["mode"]),
+            adaptive: value["adaptive"].as_bool(),
             exposure_ev: value["exposure_ev"].as_f64().filter(|ev| (-8.0..=8.0).contains(ev)).map(|ev| ev as f32),
             tone_map: choice(&value["tone_map"]),
             panels: panels.is_object().then(|| Visibility {
@@ -195,6 +199,7 @@ mod tests {
         Preferences {
             theme: ThemePreference::Light,
             mode: Some(Mode::VpRegion),
+            adaptive: Some(true),
             exposure_ev: Some(-1.25),
             tone_map: Some(ToneMapping::PbrNeutral),
             panels: Some(Visibility { panel: false, editor: true, ring: false, ..Visibility::default() }),
@@ -242,7 +247,7 @@ mod tests {
         assert!(note.unwrap().contains("settings.json"));
         assert_eq!(Store::load_from(&path).1, None, "it has been said");
         assert!(folder.join("settings.broken.json").exists(), "somebody may have written it by hand");
-        let odd = r#"{ "theme": 7, "mode": "none", "exposure_ev": 1e9, "tone_map": "linear", "panels": { "gaze": "x" },
+        let odd = r#"{ "theme": 7, "mode": "none", "adaptive": "yes", "exposure_ev": 1e9, "tone_map": "linear", "panels": { "gaze": "x" },
             "window": { "size": [3, "big"] }, "folder": [], "recent": ["/a.glb", 5, "/a.glb"] }"#;
         std::fs::write(&path, odd).unwrap();
         let (store, note) = Store::load_from(&path);

@@ -130,6 +130,21 @@ fn what_does_not_belong_together_is_refused_and_nothing_is_written() {
 /// Films of other seeds and lengths add up to a film whose mean and stated variance are right: a chi-squared test of
 /// the pixels that are noisy against a longer render, at a significance of 0.2 %, two-sided.
 #[test]
+fn an_adaptive_film_is_the_same_every_time_and_says_what_it_is() {
+    let folder = Folder::new("adaptive");
+    let options = "--samples 30000 --adaptive --film equirect:64x32";
+    let first = render(&folder, "first.exr", options);
+    assert_eq!(bytes(render(&folder, "second.exr", options)), bytes(&first));
+    let plain = render(&folder, "plain.exr", "--samples 30000 --seed 2 --film equirect:64x32");
+    let steered = |path: &Path| exr::read(path).unwrap().film.header.statistics.steered;
+    assert!((1..30_000).contains(&steered(&first)), "the first samples are placed by acuity alone");
+    assert_eq!(steered(&plain), 0);
+    let sum = folder.path("sum.exr");
+    succeeds(&["merge", text(&first), text(&plain), "-o", text(&sum)]);
+    assert_eq!(steered(&sum), steered(&first));
+}
+
+#[test]
 fn films_of_different_seeds_merge_to_a_valid_estimate() {
     let folder = Folder::new("seeds");
     let film = |name: &str, spp: u32, seed: u32| {

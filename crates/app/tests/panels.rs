@@ -280,6 +280,11 @@ fn the_settings_can_be_operated_by_keyboard() {
         harness.get_by_label(section).click();
         harness.run_steps(10);
         assert_reachable(&mut harness, section);
+        if section == "Sampling and screen" {
+            harness.get_by_role_and_label(Role::CheckBox, "Adaptive sampling").click();
+            harness.run_steps(2);
+            assert!(harness.state().0.adaptive);
+        }
         if section == "Attention" {
             harness.get_by_label("Gaze locked").click();
             harness.get_by_role_and_label(Role::Slider, "Share").set_value_accesskit(80.0);

@@ -177,12 +177,7 @@ impl Distribution {
     /// film whose sides are powers of two they are its pixels. Elsewhere pixels cut through strata, and a part of a sequence is
     /// not well spread: there a pixel that gets most samples consists of [`STRATA_OF_A_PIXEL`].
     pub(crate) fn stratum_bits(&self, film: &FilmOptions) -> [u32; 2] {
-        let sum: f32 = self.layers.iter().map(|(weight, _)| weight).sum();
-        let shares = self.layers.iter().map(|(weight, layer)| {
-            let share = f64::from(weight / sum) * self.largest_share(layer, film);
-            (share, layer)
-        });
-        let (share, layer) = shares.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((1.0, &Layer::Film));
+        let (share, layer) = self.densest_layer(film);
         let bits = (STRATA_OF_A_PIXEL / share).log2().round().clamp(2.0, 30.0) as u32;
         match layer {
             Layer::Film if film.width.is_power_of_two() && film.height.is_power_of_two() => {
@@ -192,6 +187,41 @@ impl Distribution {
             Layer::Pixels(_) => [bits - 1, 1],
             _ => [bits.div_ceil(2), bits / 2],
         }
+    }
+
+    /// Share of all samples that falls on the pixel which gets most of them.
+    pub(crate) fn peak_share(&self, film: &FilmOptions) -> f64 {
+        self.densest_layer(film).0.clamp(1e-12, 1.0)
+    }
+
+    /// The layer that gives most samples to a single pixel, with the share of all samples that falls there.
+    fn densest_layer(&self, film: &FilmOptions) -> (f64, &Layer) {
+        let sum: f32 = self.layers.iter().map(|(weight, _)| weight).sum();
+        let shares = self.layers.iter().map(|(weight, layer)| {
+            let share = f64::from(weight / sum) * self.largest_share(layer, film);
+            (share, layer)
+        });
+        shares.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((1.0, &Layer::Film))
+    }
+
+    /// Film pixels that the eye does not tell apart, about samples whose first number is `u`: the solid angle that a sample of an
+    /// acuity layer stands for, over that at the gaze; 1 in other layers.
+    pub(crate) fn element_pixels(&self, u: f32) -> f32 {
+        /// Part of a layer over which its density is taken as one.
+        const STEP: f32 = 1e-3;
+        let sum: f32 = self.layers.iter().map(|(weight, _)| weight).sum();
+        let mut lower = 0.0;
+        for (weight, layer) in &self.layers {
+            let share = weight / sum;
+            if u < lower + share {
+                let Layer::Acuity { radius_scale, .. } = layer else { return 1.0 };
+                let radius = |x: f32| self.inverse.eval_versine(x * radius_scale);
+                let x = ((u - lower) / share).clamp(STEP, 1.0 - STEP);
+                return ((radius(x + STEP) - radius(x - STEP)) / (2.0 * radius(STEP))).max(1.0);
+            }
+            lower += share;
+        }
+        1.0
     }
 
     /// Share of a layer's samples that falls on the pixel which gets most of them.

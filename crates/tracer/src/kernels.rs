@@ -8,6 +8,7 @@ use wesl::{CompileOptions, ModulePath, VirtualResolver, Wesl};
 
 use crate::{
     features::{Feature, SceneFeatures},
+    guide::{GUIDE_COLUMNS_PER_ROW, GUIDE_POINTS},
     scene::ContentHash,
     view::{
         colors,
@@ -44,6 +45,8 @@ const MODULES: &[(&str, &str)] = &[
     ("path_bindings", include_str!("../../../shaders/path_bindings.wesl")),
     ("sampling::random", include_str!("../../../shaders/sampling/random.wesl")),
     ("sampling::distribution", include_str!("../../../shaders/sampling/distribution.wesl")),
+    ("sampling::guide", include_str!("../../../shaders/sampling/guide.wesl")),
+    ("sampling::noise", include_str!("../../../shaders/sampling/noise.wesl")),
     ("film::mapping", include_str!("../../../shaders/film/mapping.wesl")),
     ("film::accumulate", include_str!("../../../shaders/film/accumulate.wesl")),
     ("scene::traverse", include_str!("../../../shaders/scene/traverse.wesl")),
@@ -93,6 +96,8 @@ pub enum Kernel {
     Trace,
     /// Only the choice of the pixel and the primary ray, for the bench of ray generation.
     Generate,
+    /// How noisy the film is where the samples of each cell of the unit square fall.
+    Noise,
     /// What a list of rays meets.
     Query,
     /// Records to film.
@@ -125,9 +130,10 @@ pub enum Kernel {
 
 impl Kernel {
     /// Every kernel.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::Trace,
         Self::Generate,
+        Self::Noise,
         Self::Query,
         Self::Accumulate,
         Self::Gather,
@@ -149,6 +155,7 @@ impl Kernel {
         match self {
             Self::Trace => "path::trace",
             Self::Generate => "path::generate",
+            Self::Noise => "sampling::noise",
             Self::Query => "scene::query",
             Self::Accumulate => "film::accumulate",
             Self::Gather => "view::gather",
@@ -184,6 +191,7 @@ impl Kernel {
         match self {
             Self::Trace => "trace",
             Self::Generate => "generate",
+            Self::Noise => "noise",
             Self::Query => "query",
             Self::Accumulate => "accumulate",
             Self::Gather => "gather",
@@ -342,6 +350,8 @@ fn constants_module(c: &KernelConstants) -> String {
         ("GLASS_SIZE", GLASS_SIZE),
         ("GLASS_LAYERS", GLASS_LAYERS),
         ("FIRST_ROULETTE_BOUNCE", FIRST_ROULETTE_BOUNCE),
+        ("GUIDE_COLUMNS_PER_ROW", GUIDE_COLUMNS_PER_ROW),
+        ("GUIDE_POINTS", GUIDE_POINTS),
         ("HISTOGRAM_BINS", HISTOGRAM_BINS as u32),
         ("HISTOGRAM_BINS_PER_STOP", HISTOGRAM_BINS_PER_STOP as u32),
         ("HISTOGRAM_WORDS", HISTOGRAM_WORDS as u32),

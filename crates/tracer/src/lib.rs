@@ -15,6 +15,7 @@ pub mod environment;
 pub mod features;
 pub mod film;
 pub mod gpu;
+pub mod guide;
 pub mod import;
 pub mod kernels;
 pub mod panorama;

@@ -5,6 +5,7 @@ use std::{sync::Arc, time::Instant};
 use glam::Vec3;
 use thiserror::Error;
 
+mod adaptive;
 mod batch;
 mod beside;
 mod generation;
@@ -106,6 +107,7 @@ pub struct Renderer {
     scene_hash: ContentHash,
     /// Counts the scenes that were set.
     scene_version: u64,
+    adaptive: adaptive::Adaptive,
     view: ViewRenderer,
 }
 
@@ -154,6 +156,7 @@ impl Renderer {
             restored: Vec::new(),
             scene_hash: ContentHash::default(),
             scene_version: 0,
+            adaptive: adaptive::Adaptive::default(),
         };
         renderer.upload_pixel_list();
         Ok(renderer)
@@ -250,6 +253,7 @@ impl Renderer {
                 return Err(error);
             }
         }
+        self.drop_guide();
         self.upload_pixel_list();
         Ok(())
     }
@@ -334,6 +338,8 @@ impl Renderer {
         self.samples = 0;
         self.next_sample = self.first_sample;
         self.restored.clear();
+        self.adaptive.steered = 0;
+        self.drop_guide();
     }
 
     /// Starts the film anew with other random numbers; nothing of the old picture is shown.
@@ -366,14 +372,16 @@ impl Renderer {
         &self.gpu
     }
 
-    /// Records and submits one batch of at most `samples` samples and returns how many; does not wait.
+    /// Records and submits one batch of at most `samples` samples and returns how many; does not wait, unless noise is judged
+    /// ([`Renderer::set_adaptive`]).
     ///
     /// Batches are powers of two, aligned in the sequence, up to [`LARGEST_BATCH`]: the first after a restart can have
     /// any such size, the next at most as many as are done already, and so on.
     ///
     /// # Errors
-    /// When there is no scene.
+    /// When there is no scene, or the device is lost while noise is judged.
     pub fn trace(&mut self, samples: u32) -> Result<u32, RenderError> {
+        self.follow_noise()?;
         let samples = self.next_batch(samples);
         self.write_params(samples)?;
         let bound = self.bound.as_ref().ok_or(RenderError::NoScene)?;
@@ -382,13 +390,14 @@ impl Renderer {
         self.gpu.queue.submit([encoder.finish()]);
         self.samples += u64::from(samples);
         self.next_sample += u64::from(samples);
+        self.count_steered(samples);
         Ok(samples)
     }
 
     fn next_batch(&self, wanted: u32) -> u32 {
         let first = self.next_sample;
         let aligned = if first == 0 { LARGEST_BATCH } else { 1 << first.trailing_zeros().min(LARGEST_BATCH.ilog2()) };
-        let wanted = wanted.clamp(1, LARGEST_BATCH);
+        let wanted = u64::from(wanted.clamp(1, LARGEST_BATCH)).min(self.samples_until_judged());
         aligned.min(1 << wanted.ilog2())
     }
 

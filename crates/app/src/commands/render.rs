@@ -74,6 +74,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     let prepared = renderer.set_scene(&scene)?;
     renderer.set_pose(pose);
     renderer.set_first_sample(args.first_sample);
+    renderer.set_adaptive(args.sampling.adaptive);
     if let (Some(file), Some(path)) = (&resumed, &args.resume) {
         resume::restore(&mut renderer, file, path)?;
     }

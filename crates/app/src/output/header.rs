@@ -39,6 +39,7 @@ pub fn to_json(header: &FilmHeader) -> Map<String, Value> {
         ("shadow_rays", counts.shadow_rays.into()),
         ("non_finite_dropped", counts.non_finite.into()),
         ("clamped", counts.clamped.into()),
+        ("adaptive_samples", counts.steered.into()),
     ];
     fields.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
 }
@@ -92,6 +93,8 @@ pub fn from_json(settings: &Value) -> Result<FilmHeader, String> {
         shadow_rays: number(&settings["shadow_rays"], "shadow_rays")?,
         non_finite: small(&settings["non_finite_dropped"], "non_finite_dropped")?,
         clamped: small(&settings["clamped"], "clamped")?,
+        // Films from before there was adaptive sampling do not say that they have none.
+        steered: settings.get("adaptive_samples").map_or(Ok(0), |count| number(count, "adaptive_samples"))?,
     };
     Ok(header)
 }
@@ -150,6 +153,7 @@ pub(crate) mod tests {
                 shadow_rays: 1 << 60,
                 non_finite: u32::MAX,
                 clamped: 3,
+                steered: 1 << 30,
             },
         };
         header.statistics.samples = header.samples();

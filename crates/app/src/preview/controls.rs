@@ -20,6 +20,8 @@ pub struct Controls {
     pub mode: Mode,
     /// What the foveated mode goes by.
     pub acuity: Acuity,
+    /// More samples to where the film is visibly noisy; not in a headset.
+    pub adaptive: bool,
     /// Whether foveated samples are clipped to the view.
     pub clip: Clip,
     /// Where eccentricity is measured.
@@ -51,6 +53,7 @@ impl From<&PreviewArgs> for Controls {
         Self {
             mode: args.sampling.mode,
             acuity: args.sampling.acuity(),
+            adaptive: args.sampling.adaptive,
             clip: args.clip,
             eccentricity: args.eccentricity,
             screen: args.sampling.screen(),

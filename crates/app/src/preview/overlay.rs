@@ -348,6 +348,8 @@ fn sampling(ui: &mut Ui, facts: &Facts<'_>, controls: &mut Controls, visibility:
         ui.checkbox(&mut at_eye, "Eccentricity at the eye").on_hover_text("Off: angles in the scene, as in a headset");
         controls.eccentricity = if at_eye { EccentricityAt::Eye } else { EccentricityAt::Scene };
     });
+    ui.checkbox(&mut controls.adaptive, "Adaptive sampling")
+        .on_hover_text("More samples to where the picture is visibly noisy; biases it slightly. Not in a headset");
     ui.checkbox(&mut visibility.ring, "Ring at the fovea");
     ui.checkbox(&mut visibility.eccentricity, "Rings of eccentricity").on_hover_text("Shift F: degrees from the gaze");
     Grid::new("screen").num_columns(2).spacing([8.0, 3.0]).show(ui, |ui| {

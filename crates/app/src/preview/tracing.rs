@@ -215,6 +215,7 @@ impl Tracing {
             }
         }
         let moved = self.set_pose_and_aim(look, aim, &inverse)?;
+        self.renderer()?.set_adaptive(controls.adaptive);
         self.follow_comparison(look, aim, &inverse)?;
         let turned = self.view != Some(view);
         self.view = Some(view);
@@ -310,7 +311,10 @@ impl Tracing {
             self.set_plan(plan, aim, &inverse)?;
             changed = true;
         }
-        Ok(self.set_pose_and_aim(look, aim, &inverse)? || changed)
+        let moved = self.set_pose_and_aim(look, aim, &inverse)?;
+        // Judging the noise waits for the device; a headset's frames do not.
+        self.renderer()?.set_adaptive(false);
+        Ok(moved || changed)
     }
 
     /// Goes on with scene and film on another device. Where the old one does not give its film back, the film is the one

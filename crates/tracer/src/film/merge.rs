@@ -54,6 +54,7 @@ impl FilmSnapshot {
         total.shadow_rays = total.shadow_rays.saturating_add(theirs.statistics.shadow_rays);
         total.non_finite = total.non_finite.saturating_add(theirs.statistics.non_finite);
         total.clamped = total.clamped.saturating_add(theirs.statistics.clamped);
+        total.steered = total.steered.saturating_add(theirs.statistics.steered);
         ours.ranges = ranges;
         self.words = words;
         Ok(())

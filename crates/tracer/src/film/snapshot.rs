@@ -86,6 +86,14 @@ pub enum DamagedFilm {
     /// Ranges out of order, in each other, or beyond 2^62.
     #[error("the film's ranges of samples contradict each other")]
     Ranges,
+    /// More samples by the film's own noise than it holds.
+    #[error("of the film's {samples} samples {steered} are said to be placed by its noise")]
+    Steered {
+        /// In the film.
+        samples: u64,
+        /// Of them, by the header.
+        steered: u64,
+    },
 }
 
 /// A setting in which two films, or a film and a renderer, differ: their samples cannot be in one film.
@@ -173,6 +181,10 @@ impl FilmSnapshot {
         let in_range = |range: &SampleRange| range.end() <= LAST_SAMPLE;
         if !ranges.iter().all(in_range) || !ranges.windows(2).all(apart) || self.header.samples() > LAST_SAMPLE {
             return Err(DamagedFilm::Ranges);
+        }
+        let (samples, steered) = (self.header.samples(), self.header.statistics.steered);
+        if steered > samples {
+            return Err(DamagedFilm::Steered { samples, steered });
         }
         Ok(())
     }

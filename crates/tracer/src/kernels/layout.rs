@@ -95,7 +95,8 @@ shared! {
         backdrop: [f32; 3],
         has_backdrop: u32,
         stratum_bits: [u32; 2],
-        pad_0: [u32; 2],
+        guide_first: u32,
+        guide_rows: u32,
         order: [[u32; 4]; 5],
         layers: [SampleLayer; MAX_LAYERS],
     }
@@ -107,6 +108,15 @@ shared! {
         rays: u32,
         index: u32,
         pad_0: [u32; 2],
+    }
+
+    /// What the film says about the pixels of some points of a cell of the unit square. Luminance is in its own quanta.
+    struct CellNoise {
+        points: f32,
+        samples: f32,
+        light: f32,
+        freedom: f32,
+        squares: f32,
     }
 
     /// A ray to be answered alone.

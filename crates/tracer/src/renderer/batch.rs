@@ -7,6 +7,7 @@ use glam::Mat3;
 use super::{RenderError, Renderer, SequenceKind};
 use crate::{
     coherence::order_columns,
+    guide::Guide,
     kernels::{
         Kernel, WORKGROUP_SIZE,
         layout::{self, BatchParams},
@@ -33,7 +34,12 @@ impl Renderer {
     }
 
     pub(super) fn write_params(&self, samples: u32) -> Result<(), RenderError> {
-        let params = self.batch_params(samples)?;
+        self.write_guided_params(samples, self.guide().map_or(0, Guide::rows))
+    }
+
+    /// The unit square has so many rows of cells; 0 without a guide.
+    pub(super) fn write_guided_params(&self, samples: u32, guide_rows: u32) -> Result<(), RenderError> {
+        let params = BatchParams { guide_rows, ..self.batch_params(samples)? };
         for (slab, buffer) in self.film.slabs.iter().zip(&self.params) {
             let params =
                 BatchParams { first_slab_pixel: slab.first_pixel, slab_pixel_count: slab.pixel_count, ..params };
@@ -42,10 +48,10 @@ impl Renderer {
         Ok(())
     }
 
-    /// Of the next batch, but for the slab.
+    /// Of the next batch, but for the slab and the guide.
     pub(super) fn batch_params(&self, samples: u32) -> Result<BatchParams, RenderError> {
         let scene = self.scene.as_ref().ok_or(RenderError::NoScene)?;
-        let (layers, layer_count, _) = self.distribution.encode();
+        let (layers, layer_count, pixels) = self.distribution.encode();
         let first = self.next_sample;
         let (radiance_scale, luminance_scale) = self.film_scales();
         let columns = order_columns(samples.max(1).ilog2());
@@ -74,14 +80,16 @@ impl Renderer {
             backdrop: scene.backdrop.unwrap_or_default().to_array(),
             has_backdrop: u32::from(scene.backdrop.is_some()),
             stratum_bits: self.distribution.stratum_bits(&self.options.film),
-            pad_0: [0; 2],
+            guide_first: pixels.len() as u32,
+            guide_rows: 0,
             order,
             layers,
         })
     }
 
     pub(super) fn upload_pixel_list(&mut self) {
-        let (_, _, pixels) = self.distribution.encode();
+        let (_, _, mut pixels) = self.distribution.encode();
+        pixels.extend(self.guide().into_iter().flat_map(Guide::table).map(|bound| bound.to_bits()));
         if pixels.is_empty() {
             return;
         }

@@ -4,7 +4,7 @@ use super::{RenderError, Renderer};
 use crate::distribution::Distribution;
 
 impl Renderer {
-    /// A renderer of the same scene from the same place, with the same options, and with a film and a distribution of its own.
+    /// A renderer of the same scene from the same place, with the same options, adaptive if this one is, and with a film and a distribution of its own.
     /// Buffers and textures of the scene, and compiled kernels, are shared.
     ///
     /// # Errors
@@ -13,6 +13,7 @@ impl Renderer {
         let mut other = Self::new(&self.gpu, &self.options, distribution)?;
         other.pose = self.pose;
         (other.technique, other.spare_features) = (self.technique, self.spare_features);
+        other.set_adaptive(self.is_adaptive());
         other.share_scene_of(self)?;
         Ok(other)
     }

@@ -85,6 +85,9 @@ pub struct RenderStatistics {
     pub non_finite: u32,
     /// Samples brighter than the film's range, which were clamped.
     pub clamped: u32,
+    /// Samples whose place was chosen by what this film's earlier ones had said: where there are any, the means are biased
+    /// (by how much: docs/reports/adaptive.md).
+    pub steered: u64,
 }
 
 /// When a render is done.

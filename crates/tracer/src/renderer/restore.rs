@@ -82,6 +82,8 @@ impl Renderer {
         self.samples = snapshot.header.samples();
         self.next_sample = next.unwrap_or(self.first_sample);
         self.restored.clone_from(ranges);
+        self.adaptive.steered = counts.steered;
+        self.drop_guide();
         Ok(())
     }
 
@@ -97,6 +99,7 @@ impl Renderer {
             shadow_rays: u64::from(c.shadow_rays_low) | u64::from(c.shadow_rays_high) << 32,
             non_finite: c.non_finite,
             clamped: c.clamped,
+            steered: self.adaptive.steered,
         })
     }
 

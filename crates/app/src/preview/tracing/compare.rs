@@ -97,6 +97,7 @@ impl Tracing {
             }
         };
         side.follow(first)?;
+        side.renderer.set_adaptive(look.controls.adaptive);
         if side.modes != modes {
             side.modes = modes;
             first.restart_clean();

@@ -75,6 +75,7 @@ impl Files {
 pub(super) fn prefer(args: &PreviewArgs, kept: &Preferences, controls: &mut Controls, visibility: &mut Visibility) {
     let stated = |option: &str| args.stated.contains(&option);
     controls.mode = kept.mode.filter(|_| !stated("mode")).unwrap_or(controls.mode);
+    controls.adaptive = kept.adaptive.filter(|_| !stated("adaptive")).unwrap_or(controls.adaptive);
     controls.exposure_ev = kept.exposure_ev.filter(|_| !stated("exposure")).unwrap_or(controls.exposure_ev);
     controls.tone_map = kept.tone_map.filter(|_| !stated("tonemap")).unwrap_or(controls.tone_map);
     if let Some(panels) = kept.panels {
@@ -232,6 +233,7 @@ impl Window {
         let preferences = Preferences {
             theme: files.theme,
             mode: Some(self.controls.mode),
+            adaptive: Some(self.controls.adaptive),
             exposure_ev: Some(self.controls.exposure_ev),
             tone_map: Some(self.controls.tone_map),
             panels: Some(Visibility { keys: false, ..self.visibility }),
@@ -297,6 +299,7 @@ mod tests {
     fn what_is_kept_counts_where_the_command_line_says_nothing() {
         let kept = Preferences {
             mode: Some(Mode::Od),
+            adaptive: Some(true),
             exposure_ev: Some(2.0),
             tone_map: Some(ToneMapping::Linear),
             panels: Some(Visibility { editor: true, ring: false, ..Visibility::default() }),
@@ -306,12 +309,13 @@ mod tests {
             let args = args(line);
             let (mut controls, mut visibility) = (Controls::from(&args), Visibility::default());
             prefer(&args, &kept, &mut controls, &mut visibility);
-            (controls.mode, controls.exposure_ev, controls.tone_map, visibility.editor, visibility.ring)
+            let picture = (controls.exposure_ev, controls.tone_map);
+            (controls.mode, controls.adaptive, picture, visibility.editor, visibility.ring)
         };
-        assert_eq!(preferred(""), (Mode::Od, 2.0, ToneMapping::Linear, true, false));
+        assert_eq!(preferred(""), (Mode::Od, true, (2.0, ToneMapping::Linear), true, false));
         // A default that is asked for is asked for.
         let asked = preferred("--mode fv --exposure 0 --tonemap agx");
-        assert_eq!(asked, (Mode::Fv, 0.0, ToneMapping::Agx, true, false));
+        assert_eq!(asked, (Mode::Fv, true, (0.0, ToneMapping::Agx), true, false));
     }
 
     #[test]
