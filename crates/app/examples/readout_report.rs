@@ -1,7 +1,7 @@
 //! Does the read-out tell the truth? Runs with seeds and gazes of their own, each stopped when the read-out says "ready" or at
 //! MOST_SAMPLES, against a long render whose own variance is taken off:
-//! `cargo run --example readout_report -- OUT_FOLDER RUNS MOST_SAMPLES REFERENCE_SECONDS [SCENE.glb ...]` writes `readout.md` and
-//! `readout.json`. The built-in scene comes first.
+//! `cargo run --example readout_report -- OUT_FOLDER RUNS MOST_SAMPLES REFERENCE_SECONDS SCENE...` writes `readout.md` and
+//! `readout.json`; a scene is a file, or `builtin`.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -29,13 +29,13 @@ const RADIUS_PX: u32 = 3;
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [folder, runs, most, seconds, scenes @ ..] = arguments.as_slice() else {
-        anyhow::bail!("OUT_FOLDER RUNS MOST_SAMPLES REFERENCE_SECONDS [SCENE ...] are needed")
+        anyhow::bail!("OUT_FOLDER RUNS MOST_SAMPLES REFERENCE_SECONDS SCENE... are needed")
     };
     let effort = Effort { runs: runs.parse()?, most_samples: most.parse()?, reference_secs: seconds.parse()? };
     let gpu = Gpu::headless(&AdapterSelect::Auto)?;
     let started = Instant::now();
     let (mut rows, mut raw) = (String::new(), Vec::new());
-    let sources = std::iter::once(Source::BuiltIn).chain(scenes.iter().map(|path| Source::from(Some(Path::new(path)))));
+    let sources = scenes.iter().map(|path| Source::from(Some(Path::new(path)).filter(|_| path != "builtin")));
     for source in sources {
         let found = runs_of(&gpu, &source, effort)?;
         rows += &found.rows(&source.name());
