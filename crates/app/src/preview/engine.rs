@@ -350,6 +350,9 @@ impl Worker {
         if self.is_due(look) {
             self.show(look)?;
         }
+        if !self.motion.goes_on(Instant::now()) {
+            self.tracing.find_guides(look)?;
+        }
         Ok(())
     }
 
@@ -381,6 +384,8 @@ impl Worker {
             || last.size_px != look.size_px
             || last.controls != look.controls
             || self.tracing.is_unfinished()
+            || shown.is_guided != self.tracing.is_guided(look)
+            || look.controls.paused && shown.is_guided == Some(false)
             || shown.samples != self.tracing.samples()
                 && shown.at.elapsed() >= self.pacing.show_interval(self.show_time)
     }
@@ -398,9 +403,9 @@ impl Worker {
         if coarseness == 1 {
             self.show_time = start.elapsed();
         }
-        let samples = self.tracing.samples();
+        let (samples, is_guided) = (self.tracing.samples(), self.tracing.is_guided(look));
         self.gaze.shown(Instant::now(), self.sample);
-        self.shown = Some(Shown { look: look.clone(), samples, coarseness, smoothing, at: Instant::now() });
+        self.shown = Some(Shown { look: look.clone(), samples, coarseness, smoothing, is_guided, at: Instant::now() });
         if self.read_at.is_none_or(|at| at.elapsed() >= READ_INTERVAL) {
             let direction = look.standpoint.view.direction_at(look.gaze.point);
             let block = self.tracing.block_at(direction)?;
@@ -573,6 +578,8 @@ struct Shown {
     coarseness: u32,
     /// Samples at which a pixel counts as much as what is around it.
     smoothing: f32,
+    /// As [`Tracing::is_guided`] had it.
+    is_guided: Option<bool>,
     at: Instant,
 }
 
