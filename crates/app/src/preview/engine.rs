@@ -50,6 +50,8 @@ pub use readout::{HeadsetReadout, Message, ShownVersion};
 const IDLE: Duration = Duration::from_millis(50);
 /// How often figures are read from the device.
 const READ_INTERVAL: Duration = Duration::from_millis(500);
+/// From this tracing time of a film on its picture is denoised.
+const GUIDES_AFTER: Duration = Duration::from_millis(500);
 
 /// What the window shows, as the person has it.
 #[derive(Clone, Debug, PartialEq)]
@@ -350,7 +352,9 @@ impl Worker {
         if self.is_due(look) {
             self.show(look)?;
         }
-        if !self.motion.goes_on(Instant::now()) {
+        // A film that was emptied just now may be emptied again, by a slider's next step.
+        let rests = look.controls.paused || self.tracing.elapsed() > GUIDES_AFTER;
+        if rests && !self.motion.goes_on(Instant::now()) {
             self.tracing.find_guides(look)?;
         }
         Ok(())
