@@ -26,8 +26,10 @@ use tracer::{
     view::{DebugView, ToneMap, ViewProjection, ViewSettings},
 };
 
-mod denoise_table;
+#[path = "denoise_report/pfm.rs"]
 mod pfm;
+#[path = "denoise_report/tables.rs"]
+mod tables;
 
 /// Pixels of the view that is judged, and of the one whose cost is measured.
 const SIZE: [u32; 2] = [640, 360];
@@ -77,11 +79,12 @@ fn run(args: &[String]) -> Result<(), AnyError> {
         "view": SIZE,
         "vfov_deg": VFOV_DEG,
         "reference_spp": REFERENCE_SPP,
+        "load": std::fs::read_to_string("/proc/loadavg").unwrap_or_default().split_whitespace().next(),
         "scenes": scenes,
     });
     std::fs::create_dir_all(out)?;
     std::fs::write(out.join("denoise.json"), format!("{raw:#}\n"))?;
-    std::fs::write(out.join("denoise.md"), denoise_table::page(&raw))?;
+    std::fs::write(out.join("denoise.md"), tables::page(&raw))?;
     Ok(())
 }
 

@@ -22,6 +22,7 @@ pub fn page(raw: &Value) -> String {
          Intel Open Image Denoise (HDR, highest quality, with the same base colours and normals), from raw means with holes \
          filled\n\
          - seconds are those of tracing; first hits, once for a view, and the presentation come on top and stand below each table\n\
+         - load when it ended: {}; counts of samples and FLIP do not depend on it, seconds do\n\
          - made by `cargo run -p fovea-benches --bin denoise-report -- docs/reports WORK PYTHON SCENE...`; raw numbers in \
          denoise.json\n\n",
         raw["view"][0],
@@ -29,6 +30,7 @@ pub fn page(raw: &Value) -> String {
         raw["vfov_deg"],
         raw["reference_spp"],
         crate::EXPOSED_MEAN,
+        raw["load"].as_str().unwrap_or("not known"),
     );
     for scene in raw["scenes"].as_array().into_iter().flatten() {
         add_scene(&mut text, scene);
