@@ -110,10 +110,11 @@ fn permutations_validate_and_structures_lie_as_on_the_host() {
     let mut count = 0;
     for kernel in Kernel::ALL {
         for features in permutations() {
-            // Only the path kernels look at the scene's features, and all at the film's.
+            // Only the path kernels look at the scene's features, and all at the film's; the gathering looks for guides.
             let scene_matters = kernel.reads_scene();
             let film_only = SceneFeatures::default().with(Feature::PerspectiveFilm, true);
-            if !scene_matters && features != SceneFeatures::default() && features != film_only {
+            let guided_only = SceneFeatures::default().with(Feature::Guided, true);
+            if !scene_matters && ![SceneFeatures::default(), film_only, guided_only].contains(&features) {
                 continue;
             }
             let key = key(kernel, features, &sources);

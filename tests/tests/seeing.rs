@@ -29,6 +29,7 @@ fn as_it_is() -> ViewSettings {
         tone_map: ToneMap::Linear,
         debug_view: DebugView::Beauty,
         fill: false,
+        denoise: false,
         ring: None,
     }
 }
@@ -175,6 +176,7 @@ fn what_is_stale_is_marked_until_new_samples_cover_it() {
         projection: ViewProjection::Perspective(view),
         size: [24, 24],
         fill: true,
+        denoise: false,
         debug_view: DebugView::Stale,
         ..as_it_is()
     };
@@ -273,11 +275,11 @@ fn first_hits_are_those_of_single_rays() {
     for ((hit, answer), ray) in hits.iter().zip(&answers).zip(&rays) {
         assert!(hit.steps > 0);
         let Some(answer) = answer else {
-            same += usize::from(hit.depth == 0.0 && hit.normal == [0.0; 3] && hit.albedo == [0.0; 3]);
+            same += usize::from(hit.depth == 0.0 && hit.world_normal() == Vec3::ZERO && hit.albedo == [0.0; 3]);
             continue;
         };
         let (normal, albedo) = hit_on_host(&scene, ray, answer.instance, answer.triangle, answer.t);
-        let is_same = (hit.depth - answer.t).abs() <= 1e-4 * answer.t && Vec3::from(hit.normal).distance(normal) < 0.01;
+        let is_same = (hit.depth - answer.t).abs() <= 1e-4 * answer.t && hit.world_normal().distance(normal) < 0.01;
         let is_colored = albedo.is_none_or(|albedo| Vec3::from(hit.albedo).distance(albedo) < 1e-5);
         same += usize::from(is_same && is_colored);
         plain += usize::from(albedo.is_some());
@@ -291,7 +293,8 @@ fn first_hits_are_those_of_single_rays() {
     let to_levels = |value: f32| (255.0 * value.clamp(0.0, 1.0)).round() as i16;
     let picture = readback::draw(&mut renderer, &settings).unwrap();
     for (texel, hit) in picture.iter().zip(&hits) {
-        let expected = if hit.depth > 0.0 { hit.normal.map(|n| to_levels(0.5 + 0.5 * n)) } else { [0; 3] };
+        let expected =
+            if hit.depth > 0.0 { hit.world_normal().to_array().map(|n| to_levels(0.5 + 0.5 * n)) } else { [0; 3] };
         assert!(is_near(*texel, expected, 1), "{texel:?} {hit:?}");
     }
     let depths = || hits.iter().map(|hit| hit.depth).filter(|depth| *depth > 0.0);

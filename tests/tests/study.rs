@@ -43,6 +43,7 @@ fn look(renderer: &mut Renderer) -> (Vec<u32>, Vec<[f32; 4]>) {
         tone_map: ToneMap::Linear,
         debug_view: DebugView::Beauty,
         fill: true,
+        denoise: false,
         ring: None,
     };
     readback::draw(renderer, &settings).unwrap();

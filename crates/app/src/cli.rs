@@ -18,7 +18,7 @@ pub mod study;
 pub mod values;
 
 use bench::BenchArgs;
-use choices::{Clip, EccentricityAt, Geometry, InverseForm, Mode, Model, Orient, Sequence, Show, ToneMapping};
+use choices::{Clip, EccentricityAt, Geometry, InverseForm, Mode, Model, Orient, Sequence, Show, Switch, ToneMapping};
 use gaze::{GazeArgs, PreviewGazeArgs};
 use sampler::SamplerArgs;
 use study::StudyArgs;
@@ -178,7 +178,7 @@ pub struct RenderArgs {
 pub const FILM_OPTIONS: [&str; 6] = ["film", "camera", "orient", "seed", "sequence", "max_bounces"];
 
 /// Options of the window that are kept from run to run, by their field's name: what was kept gives way to what is asked for.
-pub const KEPT_OPTIONS: [&str; 5] = ["mode", "adaptive", "exposure", "tonemap", "window"];
+pub const KEPT_OPTIONS: [&str; 6] = ["mode", "adaptive", "exposure", "tonemap", "denoise", "window"];
 
 /// `fovea merge`.
 #[derive(Clone, Debug, Args)]
@@ -341,6 +341,9 @@ pub struct PictureArgs {
     /// From radiance to display values
     #[arg(long, value_enum, default_value_t = ToneMapping::Agx, value_name = "NAME")]
     pub tonemap: ToneMapping,
+    /// Smooth noise, guided by the surfaces that are seen; an EXR holds the film as it is either way
+    #[arg(long, value_enum, default_value_t = Switch::On, value_name = "SWITCH")]
+    pub denoise: Switch,
     /// What the picture shows: what is rendered, or what is known about its pixels
     #[arg(long, value_enum, default_value_t = Show::Picture, value_name = "NAME")]
     pub show: Show,

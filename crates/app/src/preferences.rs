@@ -42,6 +42,8 @@ pub struct Preferences {
     pub exposure_ev: Option<f32>,
     /// From radiance to display values.
     pub tone_map: Option<ToneMapping>,
+    /// Whether the picture is denoised.
+    pub denoise: Option<bool>,
     /// Which panels are open.
     pub panels: Option<Visibility>,
     /// The window.
@@ -66,6 +68,7 @@ impl Preferences {
             "adaptive": self.adaptive,
             "exposure_ev": self.exposure_ev,
             "tone_map": name(self.tone_map),
+            "denoise": self.denoise,
             "panels": panels,
             "window": window,
             // A path that is no text cannot be in a JSON file.
@@ -87,6 +90,7 @@ impl Preferences {
             adaptive: value["adaptive"].as_bool(),
             exposure_ev: value["exposure_ev"].as_f64().filter(|ev| (-8.0..=8.0).contains(ev)).map(|ev| ev as f32),
             tone_map: choice(&value["tone_map"]),
+            denoise: value["denoise"].as_bool(),
             panels: panels.is_object().then(|| Visibility {
                 panel: open("settings", usual.panel),
                 editor: open("scene", usual.editor),
@@ -202,6 +206,7 @@ mod tests {
             adaptive: Some(true),
             exposure_ev: Some(-1.25),
             tone_map: Some(ToneMapping::PbrNeutral),
+            denoise: Some(false),
             panels: Some(Visibility { panel: false, editor: true, ring: false, ..Visibility::default() }),
             window: Some(WindowPlace { size: [900.0, 600.5], position: Some([-20.0, 10.0]), maximized: true }),
             folder: Some("/scenes".into()),

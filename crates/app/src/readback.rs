@@ -70,7 +70,7 @@ pub fn check_size(gpu: &Gpu, [width, height]: [u32; 2]) -> anyhow::Result<()> {
 pub fn draw(renderer: &mut Renderer, settings: &ViewSettings) -> anyhow::Result<Vec<[u8; 4]>> {
     let gpu = renderer.gpu().clone();
     check_size(&gpu, settings.size)?;
-    while settings.debug_view.shows_first_hits() && !renderer.trace_first_hits(settings, FIRST_HITS_AT_ONCE)? {}
+    while renderer.wants_first_hits(settings) && !renderer.trace_first_hits(settings, FIRST_HITS_AT_ONCE)? {}
     let texture = picture_texture(&gpu, settings.size);
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("picture") });
     renderer.present(

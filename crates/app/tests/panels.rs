@@ -360,6 +360,22 @@ fn what_is_shown_is_chosen_in_the_panel_and_by_keys_and_has_its_legend() {
 }
 
 #[test]
+fn denoising_is_switched_in_the_panel_and_rests_while_modes_are_compared() {
+    let mut harness = settings_harness(Readout::default(), Controls::from(&args()));
+    assert!(harness.state().denoise);
+    for expected in [false, true] {
+        harness.get_by_role_and_label(Role::CheckBox, "Denoise").click();
+        harness.run_steps(3);
+        assert_eq!(harness.state().denoise, expected);
+        assert_reachable(&mut harness, "denoising");
+    }
+    harness.state_mut().comparison = Some(Comparison::default());
+    harness.run_steps(3);
+    assert!(harness.get_by_role_and_label(Role::CheckBox, "Denoise").accesskit_node().is_disabled());
+    assert!(harness.state().denoise, "it comes back with the single picture");
+}
+
+#[test]
 fn the_histogram_is_counted_while_it_is_open_and_says_its_shares() {
     let mut histogram = Histogram { pixels: 1000, black: 125, clipped: 20, ..Histogram::default() };
     (histogram.bins[0], histogram.bins[40]) = (125, 875);

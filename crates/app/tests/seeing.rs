@@ -59,6 +59,7 @@ fn whole(renderer: &mut Renderer, look: &Look) -> Vec<[u8; 4]> {
         tone_map: ToneMap::AgX,
         debug_view: look.controls.shown,
         fill: true,
+        denoise: false,
         ring: None,
     };
     readback::draw(renderer, &settings).unwrap()
@@ -170,6 +171,45 @@ fn first_hits_are_finished_by_pictures_that_are_due() {
     look.controls.shown = DebugView::Beauty;
     tracing.show(&look, 1).unwrap();
     assert!(!tracing.is_unfinished() && tracing.seen().scale.is_none());
+}
+
+/// Guides are found in parts between batches; from then on the picture is another, and without them it is what it was.
+#[test]
+fn a_resting_picture_is_denoised_once_its_first_hits_are_known() {
+    let (mut tracing, mut look) = open();
+    look.controls.denoise = true;
+    tracing.follow(&look).unwrap();
+    tracing.trace(1 << 12).unwrap();
+    let shown = |tracing: &mut Tracing, look: &Look| {
+        tracing.show(look, 1).unwrap();
+        tracing.texels().unwrap().1
+    };
+    let until_guided = |tracing: &mut Tracing, look: &Look| {
+        assert_eq!(tracing.is_guided(look), Some(false));
+        let start = Instant::now();
+        while tracing.is_guided(look) == Some(false) {
+            tracing.find_guides(look).unwrap();
+            assert!(start.elapsed() < Duration::from_secs(120), "guides do not end");
+        }
+    };
+    let plain = shown(&mut tracing, &look);
+    until_guided(&mut tracing, &look);
+    let guided = shown(&mut tracing, &look);
+    assert!(plain != guided && tracing.is_guided(&look) == Some(true));
+    // Another view has other guides, and the first one's are found again.
+    let aside = look.clone();
+    look.standpoint.view.yaw += 0.3;
+    tracing.follow(&look).unwrap();
+    shown(&mut tracing, &look);
+    until_guided(&mut tracing, &look);
+    tracing.follow(&aside).unwrap();
+    shown(&mut tracing, &aside);
+    until_guided(&mut tracing, &aside);
+    assert!(shown(&mut tracing, &aside) == guided);
+    look = aside;
+    look.controls.denoise = false;
+    assert_eq!(tracing.is_guided(&look), None);
+    assert!(shown(&mut tracing, &look) == plain);
 }
 
 #[test]

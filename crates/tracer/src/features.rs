@@ -72,6 +72,8 @@ features! {
     Unlit = "UNLIT",
     /// The film is a perspective image instead of a panorama.
     PerspectiveFilm = "PERSPECTIVE_FILM",
+    /// The view is reconstructed with guides: second moments are gathered too.
+    Guided = "GUIDED",
     /// For comparisons: what lights can be sampled is not left to BSDF sampling ([`SamplingTechnique::Lights`]).
     ///
     /// [`SamplingTechnique::Lights`]: crate::renderer::SamplingTechnique::Lights
@@ -91,6 +93,7 @@ impl Feature {
                 | Self::BinaryNodes
                 | Self::EnvironmentImage
                 | Self::PerspectiveFilm
+                | Self::Guided
                 | Self::LightSamplingOnly
                 | Self::BsdfSamplingOnly
         )

@@ -72,6 +72,16 @@ const MODULES: &[(&str, &str)] = &[
     ("view::bindings", include_str!("../../../shaders/view/bindings.wesl")),
     ("view::gather", include_str!("../../../shaders/view/gather.wesl")),
     ("view::pull", include_str!("../../../shaders/view/pull.wesl")),
+    ("view::guide", include_str!("../../../shaders/view/guide.wesl")),
+    ("view::tie_pull", include_str!("../../../shaders/view/tie_pull.wesl")),
+    ("view::tie_push", include_str!("../../../shaders/view/tie_push.wesl")),
+    ("view::ties", include_str!("../../../shaders/view/ties.wesl")),
+    ("view::demodulate", include_str!("../../../shaders/view/demodulate.wesl")),
+    ("view::guided_pull", include_str!("../../../shaders/view/guided_pull.wesl")),
+    ("view::guided_push", include_str!("../../../shaders/view/guided_push.wesl")),
+    ("view::guides", include_str!("../../../shaders/view/guides.wesl")),
+    ("view::stale", include_str!("../../../shaders/view/stale.wesl")),
+    ("view::tint", include_str!("../../../shaders/view/tint.wesl")),
     ("view::push", include_str!("../../../shaders/view/push.wesl")),
     ("view::footprint", include_str!("../../../shaders/view/footprint.wesl")),
     ("view::error", include_str!("../../../shaders/view/error.wesl")),
@@ -108,6 +118,18 @@ pub enum Kernel {
     Pull,
     /// One level filled from the coarser one.
     Push,
+    /// Guides of a view's pixels from their first hits.
+    Guide,
+    /// One level of guides from the finer one, and how alike they are.
+    TiePull,
+    /// How alike the guides of one level are to those of the coarser one.
+    TiePush,
+    /// Level 0 of a guided view: light without the surfaces' colour.
+    Demodulate,
+    /// One level of a guided view from the finer one.
+    GuidedPull,
+    /// One level of a guided view finished from the coarser one.
+    GuidedPush,
     /// Tone mapping to the target.
     Present,
     /// A debug view to the target.
@@ -130,7 +152,7 @@ pub enum Kernel {
 
 impl Kernel {
     /// Every kernel.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 23] = [
         Self::Trace,
         Self::Generate,
         Self::Noise,
@@ -139,6 +161,12 @@ impl Kernel {
         Self::Gather,
         Self::Pull,
         Self::Push,
+        Self::Guide,
+        Self::TiePull,
+        Self::TiePush,
+        Self::Demodulate,
+        Self::GuidedPull,
+        Self::GuidedPush,
         Self::Present,
         Self::Inspect,
         Self::Error,
@@ -161,6 +189,12 @@ impl Kernel {
             Self::Gather => "view::gather",
             Self::Pull => "view::pull",
             Self::Push => "view::push",
+            Self::Guide => "view::guide",
+            Self::TiePull => "view::tie_pull",
+            Self::TiePush => "view::tie_push",
+            Self::Demodulate => "view::demodulate",
+            Self::GuidedPull => "view::guided_pull",
+            Self::GuidedPush => "view::guided_push",
             Self::Present => "view::present",
             Self::Inspect => "view::inspect",
             Self::Error => "view::error",
@@ -197,6 +231,12 @@ impl Kernel {
             Self::Gather => "gather",
             Self::Pull => "pull",
             Self::Push => "push",
+            Self::Guide => "guide",
+            Self::TiePull => "tie_pull",
+            Self::TiePush => "tie_push",
+            Self::Demodulate => "demodulate",
+            Self::GuidedPull => "guided_pull",
+            Self::GuidedPush => "guided_push",
             Self::Present => "present",
             Self::Inspect => "inspect",
             Self::Error => "error",

@@ -25,6 +25,8 @@ mod placement;
 mod texels;
 mod vertices;
 
+pub(crate) use vertices::decode_octahedral;
+
 pub use alias::AliasTable;
 pub use cache::SceneCache;
 use placement::Placement;

@@ -12,7 +12,7 @@ use crate::{
     kernels::{
         Kernel, KernelKey, TILE_SIZE, WORKGROUP_SIZE,
         layout::{self, ViewParams, codes},
-        pipelines::PipelineCache,
+        pipelines::{Pipeline, PipelineCache},
     },
     renderer::RenderError,
 };
@@ -20,10 +20,12 @@ use crate::{
 pub mod colors;
 mod debug;
 mod first_hits;
+mod guided;
 pub mod histogram;
 
 pub use debug::{DebugScale, DebugView};
 pub(crate) use first_hits::{FirstHits, HitsOf};
+use guided::{Guides, with_guides};
 pub use histogram::Histogram;
 
 /// View transform from radiance to display.
@@ -64,9 +66,20 @@ pub struct ViewSettings {
     pub debug_view: DebugView,
     /// Fill pixels without samples and smooth where there are few; false shows the film's means, black without samples.
     pub fill: bool,
+    /// Reconstruct the picture with guides, once all first hits of this view are known
+    /// ([`Renderer::trace_first_hits`](crate::renderer::Renderer::trace_first_hits)); until then, and where it is not filled, as
+    /// without. The film is only read.
+    pub denoise: bool,
     /// Circle drawn at the fovea's edge: its centre on the image plane in units of the half extents, and the tangent of
     /// its radius on the image plane.
     pub ring: Option<(Vec2, f32)>,
+}
+
+impl ViewSettings {
+    /// Whether first hits are guides of this view, as soon as they are all known.
+    pub const fn uses_guides(&self) -> bool {
+        self.denoise && self.fill && matches!(self.debug_view, DebugView::Beauty)
+    }
 }
 
 /// Samples at which a pixel's own mean weighs as much as its neighbourhood's, unless told otherwise.
@@ -108,8 +121,9 @@ pub(crate) struct ViewRenderer {
     pyramid: Option<wgpu::Buffer>,
     stale: Option<(wgpu::Buffer, View, [u32; 2])>,
     last: Option<ViewProjection>,
-    /// While a debug view shows them.
+    /// While a debug view shows them or they are guides.
     pub hits: Option<FirstHits>,
+    guides: Option<Guides>,
     errors: Option<wgpu::Buffer>,
     /// Bound in the place of what a debug view does not read.
     nothing: wgpu::Buffer,
@@ -133,6 +147,7 @@ impl ViewRenderer {
             stale: None,
             last: None,
             hits: None,
+            guides: None,
             errors: None,
             nothing: gpu.buffer("nothing", &[0; 64], BufferUsages::STORAGE),
             smoothing_samples: CONFIDENCE_SAMPLES,
@@ -220,16 +235,33 @@ impl ViewRenderer {
         let film = source.film;
         let shows_errors = settings.debug_view == DebugView::Error;
         self.make_room(settings, shows_errors);
-        let gather = pipelines.compute(device, &key(Kernel::Gather))?;
+        let is_guided = self.guides.is_some();
+        let tie = match &self.guides {
+            Some(guides) if guides.are_untied() => Some([
+                pipelines.compute(device, &key(Kernel::Guide))?,
+                pipelines.compute(device, &key(Kernel::TiePull))?,
+                pipelines.compute(device, &key(Kernel::TiePush))?,
+            ]),
+            _ => None,
+        };
+        let gather = pipelines.compute(device, &with_guides(key(Kernel::Gather), is_guided))?;
+        let demodulate = is_guided.then(|| pipelines.compute(device, &key(Kernel::Demodulate))).transpose()?;
         let error = shows_errors.then(|| pipelines.compute(device, &key(Kernel::Error))).transpose()?;
-        let pull = pipelines.compute(device, &key(Kernel::Pull))?;
-        let push = pipelines.compute(device, &key(Kernel::Push))?;
+        let [pull, push] =
+            if is_guided { [Kernel::GuidedPull, Kernel::GuidedPush] } else { [Kernel::Pull, Kernel::Push] };
+        let pull = pipelines.compute(device, &key(pull))?;
+        let push = pipelines.compute(device, &key(push))?;
         let is_picture = settings.debug_view == DebugView::Beauty;
         let draw = if is_picture { Kernel::Present } else { Kernel::Inspect };
         let draw = pipelines.drawn(device, &key(draw), target.format)?;
         let errors = self.errors.as_ref().unwrap_or(&self.nothing);
         let pyramid = self.pyramid.as_ref().expect("made by resize");
-        let stale = self.stale.as_ref().map_or(pyramid, |(buffer, ..)| buffer);
+        // Without a stale picture another buffer stands in for it, unread; it must not be the one written to.
+        let stale = self.stale.as_ref().map_or(&film.slabs[0].buffer, |(buffer, ..)| buffer);
+        let hits = self.hits.as_ref().map_or(&self.nothing, |hits| &hits.buffer);
+        let untied = self.guides.as_mut().and_then(Guides::take_untied);
+        let guides = untied.as_ref().unwrap_or(&self.nothing);
+        let (ties, moments) = self.guides.as_ref().map_or((&self.nothing, &self.nothing), Guides::buffers);
         let base = self.params(source, settings);
         let upload =
             |params: ViewParams| gpu.buffer("view parameters", bytemuck::bytes_of(&params), BufferUsages::UNIFORM);
@@ -248,11 +280,28 @@ impl ViewRenderer {
                     (1, slab.buffer.as_entire_binding()),
                     (2, pyramid.as_entire_binding()),
                     (4, errors.as_entire_binding()),
+                    (7, moments.as_entire_binding()),
                 ];
                 for kernel in std::iter::once(&gather).chain(&error) {
                     let group = kernel.bind(device, 0, &resources);
                     kernel.dispatch(&mut pass, &[&group], tiles(settings.size));
                 }
+            }
+            let of_level = |kernel: &Pipeline, params: ViewParams| {
+                let params = upload(params);
+                let resources = [
+                    (0, params.as_entire_binding()),
+                    (2, pyramid.as_entire_binding()),
+                    (3, stale.as_entire_binding()),
+                    (5, hits.as_entire_binding()),
+                    (6, guides.as_entire_binding()),
+                    (7, moments.as_entire_binding()),
+                    (8, ties.as_entire_binding()),
+                ];
+                kernel.bind(device, 0, &resources)
+            };
+            if let Some(demodulate) = &demodulate {
+                demodulate.dispatch(&mut pass, &[&of_level(demodulate, base)], tiles(settings.size));
             }
             let pairs: Vec<_> = self.levels.windows(2).map(|w| (w[0], w[1])).enumerate().collect();
             let level_params = |level: usize, fine: Level, coarse: Level| ViewParams {
@@ -263,28 +312,26 @@ impl ViewRenderer {
                 coarse_size: coarse.size,
                 ..base
             };
+            if let Some([guide, tie_pull, tie_push]) = &tie {
+                guide.dispatch(&mut pass, &[&of_level(guide, base)], tiles(settings.size));
+                for &(level, (fine, coarse)) in &pairs {
+                    let group = of_level(tie_pull, level_params(level, fine, coarse));
+                    tie_pull.dispatch(&mut pass, &[&group], tiles(coarse.size));
+                }
+                for &(level, (fine, coarse)) in &pairs {
+                    let group = of_level(tie_push, level_params(level, fine, coarse));
+                    tie_push.dispatch(&mut pass, &[&group], tiles(fine.size));
+                }
+            }
             for &(level, (fine, coarse)) in &pairs {
-                let params = upload(level_params(level, fine, coarse));
-                let group = pull.bind(device, 0, &[(0, params.as_entire_binding()), (2, pyramid.as_entire_binding())]);
+                let group = of_level(&pull, level_params(level, fine, coarse));
                 pull.dispatch(&mut pass, &[&group], tiles(coarse.size));
             }
             for &(level, (fine, coarse)) in pairs.iter().rev() {
-                let params = upload(level_params(level, fine, coarse));
-                // Without a stale picture another buffer stands in for it, unread; it must not be the one written to.
-                let stand_in = self.stale.is_none().then(|| &film.slabs[0].buffer);
-                let group = push.bind(
-                    device,
-                    0,
-                    &[
-                        (0, params.as_entire_binding()),
-                        (2, pyramid.as_entire_binding()),
-                        (3, stand_in.unwrap_or(stale).as_entire_binding()),
-                    ],
-                );
+                let group = of_level(&push, level_params(level, fine, coarse));
                 push.dispatch(&mut pass, &[&group], tiles(fine.size));
             }
         }
-        let hits = self.hits.as_ref().map_or(&self.nothing, |hits| &hits.buffer);
         let group = draw.bind(
             device,
             0,
@@ -313,8 +360,15 @@ impl ViewRenderer {
                 mapped_at_creation: false,
             }));
         }
-        if !settings.debug_view.shows_first_hits() {
+        if !settings.debug_view.shows_first_hits() && !settings.uses_guides() {
             self.hits = None;
+        }
+        let texels = self.levels.iter().map(|level| u64::from(level.size[0]) * u64::from(level.size[1])).sum();
+        let known = self.hits.as_ref().filter(|hits| hits.rows == settings.size[1]).map(|hits| hits.of);
+        match known.filter(|_| settings.uses_guides() && self.levels.len() > 1) {
+            None => self.guides = None,
+            Some(of) if self.guides.as_ref().is_some_and(|guides| guides.of == of) => {}
+            Some(of) => self.guides = Some(Guides::new(&self.gpu, texels, of)),
         }
     }
 

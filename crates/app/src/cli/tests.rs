@@ -56,7 +56,7 @@ fn every_option_of_render_is_read() {
          --seed 4294967295 --sequence independent --env sky.hdr --env-rotate -90 --model reddy --geometry plane \
          --inverse eq6 --floor 0 --exposure -1.5 --tonemap pbr-neutral --json --dump-kernels out --adapter llvmpipe \
          --screen-mm 600x340 --distance-mm 700 --sun-angle 0.53 --gltf-scene 1 --time -0.5 --variant beach \
-         --show noise",
+         --show noise --denoise off",
     );
     assert_eq!(args.scene.camera, Some(CameraChoice::Name("Front".into())));
     assert_eq!(args.view, Some(ViewAngles { yaw_deg: -30.0, pitch_deg: 10.0, hfov_deg: 90.0, vfov_deg: 60.0 }));
@@ -64,7 +64,7 @@ fn every_option_of_render_is_read() {
     assert_eq!(args.stop.samples, Some(5_000_000_000));
     assert_eq!((args.scene.sun_angle, args.scene.file.gltf_scene, args.scene.file.time), (0.53, Some(1), Some(-0.5)));
     assert_eq!(args.scene.file.variant.as_deref(), Some("beach"));
-    assert_eq!(args.picture.show, Show::Noise);
+    assert_eq!((args.picture.show, args.picture.denoise), (Show::Noise, Switch::Off));
     assert_eq!((args.scene.env_rotate, args.picture.exposure), (-90.0, -1.5));
     assert_eq!(args.sampling.screen_mm, Some(SizeMm { width: 600.0, height: 340.0 }));
     assert_eq!(render("-o a.exr --camera 2").scene.camera, Some(CameraChoice::Index(2)));

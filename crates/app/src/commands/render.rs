@@ -16,7 +16,7 @@ use tracer::scene::Scene;
 use tracer::view::{ViewProjection, ViewSettings};
 
 use super::print_json;
-use crate::cli::choices::{EccentricityAt, Mode, Orient};
+use crate::cli::choices::{EccentricityAt, Mode, Orient, Switch};
 use crate::cli::values::{FilmShape, ViewAngles};
 use crate::cli::{RenderArgs, StopArgs};
 use crate::output::exr::{self, FilmFile};
@@ -278,6 +278,7 @@ fn whole_film(args: &RenderArgs, film: &FilmOptions) -> ViewSettings {
         tone_map: args.picture.tonemap.into(),
         debug_view: args.picture.show.into(),
         fill: true,
+        denoise: args.picture.denoise == Switch::On,
         ring: None,
     }
 }

@@ -19,7 +19,7 @@ pub(super) mod bench;
 mod curves;
 mod error;
 mod figure;
-mod flip;
+pub mod flip;
 mod observer;
 mod picture;
 pub(super) mod plan;

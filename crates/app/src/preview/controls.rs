@@ -8,7 +8,7 @@ use super::compare::Comparison;
 use super::seeing::Seen;
 use crate::attention::Attention;
 use crate::cli::PreviewArgs;
-use crate::cli::choices::{Clip, EccentricityAt, Mode, ToneMapping};
+use crate::cli::choices::{Clip, EccentricityAt, Mode, Switch, ToneMapping};
 use crate::convergence::Convergence;
 use crate::sampling::Acuity;
 use crate::screen::ScreenGeometry;
@@ -34,6 +34,8 @@ pub struct Controls {
     pub tone_map: ToneMapping,
     /// What one key goes back to from false colour.
     pub usual_tone_map: ToneMapping,
+    /// The picture is reconstructed with guides as soon as they are known.
+    pub denoise: bool,
     /// What the picture shows.
     pub shown: DebugView,
     /// What one key shows in the picture's place.
@@ -62,6 +64,7 @@ impl From<&PreviewArgs> for Controls {
             usual_tone_map: Some(args.picture.tonemap)
                 .filter(|map| *map != ToneMapping::FalseColor)
                 .unwrap_or(ToneMapping::Agx),
+            denoise: args.picture.denoise == Switch::On,
             shown: args.picture.show.into(),
             inspected: Some(args.picture.show.into())
                 .filter(|shown| *shown != DebugView::Beauty)

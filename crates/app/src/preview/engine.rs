@@ -50,6 +50,8 @@ pub use readout::{HeadsetReadout, Message, ShownVersion};
 const IDLE: Duration = Duration::from_millis(50);
 /// How often figures are read from the device.
 const READ_INTERVAL: Duration = Duration::from_millis(500);
+/// From this tracing time of a film on its picture is denoised.
+const GUIDES_AFTER: Duration = Duration::from_millis(500);
 
 /// What the window shows, as the person has it.
 #[derive(Clone, Debug, PartialEq)]
@@ -350,6 +352,11 @@ impl Worker {
         if self.is_due(look) {
             self.show(look)?;
         }
+        // A film that was emptied just now may be emptied again, by a slider's next step.
+        let rests = look.controls.paused || self.tracing.elapsed() > GUIDES_AFTER;
+        if rests && !self.motion.goes_on(Instant::now()) {
+            self.tracing.find_guides(look)?;
+        }
         Ok(())
     }
 
@@ -381,6 +388,8 @@ impl Worker {
             || last.size_px != look.size_px
             || last.controls != look.controls
             || self.tracing.is_unfinished()
+            || shown.is_guided != self.tracing.is_guided(look)
+            || look.controls.paused && shown.is_guided == Some(false)
             || shown.samples != self.tracing.samples()
                 && shown.at.elapsed() >= self.pacing.show_interval(self.show_time)
     }
@@ -398,9 +407,9 @@ impl Worker {
         if coarseness == 1 {
             self.show_time = start.elapsed();
         }
-        let samples = self.tracing.samples();
+        let (samples, is_guided) = (self.tracing.samples(), self.tracing.is_guided(look));
         self.gaze.shown(Instant::now(), self.sample);
-        self.shown = Some(Shown { look: look.clone(), samples, coarseness, smoothing, at: Instant::now() });
+        self.shown = Some(Shown { look: look.clone(), samples, coarseness, smoothing, is_guided, at: Instant::now() });
         if self.read_at.is_none_or(|at| at.elapsed() >= READ_INTERVAL) {
             let direction = look.standpoint.view.direction_at(look.gaze.point);
             let block = self.tracing.block_at(direction)?;
@@ -573,6 +582,8 @@ struct Shown {
     coarseness: u32,
     /// Samples at which a pixel counts as much as what is around it.
     smoothing: f32,
+    /// As [`Tracing::is_guided`] had it.
+    is_guided: Option<bool>,
     at: Instant,
 }
 

@@ -250,6 +250,9 @@ fn pixel(ui: &mut Ui, facts: &Facts<'_>) {
     });
 }
 
+const DENOISE_HINT: &str =
+    "Smooths noise by the surfaces that are seen, once the picture rests; the film stays as it is";
+
 fn picture(ui: &mut Ui, controls: &mut Controls) {
     Grid::new("picture").num_columns(2).min_col_width(72.0).spacing([8.0, 5.0]).show(ui, |ui| {
         let label = ui.label(RichText::new("Exposure").weak());
@@ -266,6 +269,16 @@ fn picture(ui: &mut Ui, controls: &mut Controls) {
             }
         });
         combo.response.labelled_by(label.id);
+        ui.end_row();
+
+        let label = ui.label(RichText::new("Denoise").weak()).on_hover_text(DENOISE_HINT);
+        let hint = if controls.comparison.is_some() { "Not while two modes are compared" } else { DENOISE_HINT };
+        ui.add_enabled_ui(controls.comparison.is_none(), |ui| {
+            ui.checkbox(&mut controls.denoise, "")
+                .labelled_by(label.id)
+                .on_hover_text(hint)
+                .on_disabled_hover_text(hint);
+        });
         ui.end_row();
 
         seeing::rows(ui, controls);

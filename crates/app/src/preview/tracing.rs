@@ -374,8 +374,7 @@ impl Tracing {
 
     /// Draws the picture, with one texel for `coarseness` by `coarseness` pixels, and waits for it.
     pub fn show(&mut self, look: &Look, coarseness: u32) -> anyhow::Result<Picture> {
-        let limit = self.gpu.device.limits().max_texture_dimension_2d;
-        let size = (look.size_px / coarseness.max(1)).clamp(UVec2::ONE, UVec2::splat(limit)).to_array();
+        let size = self.picture_size(look, coarseness);
         if self.target.as_ref().is_none_or(|target| [target.texture.width(), target.texture.height()] != size) {
             self.generations += 1;
             let texture = readback::picture_texture(&self.gpu, size);
@@ -393,6 +392,11 @@ impl Tracing {
         self.gpu.wait()?;
         self.look_at_picture(look, &settings)?;
         Ok(picture)
+    }
+
+    fn picture_size(&self, look: &Look, coarseness: u32) -> [u32; 2] {
+        let limit = self.gpu.device.limits().max_texture_dimension_2d;
+        (look.size_px / coarseness.max(1)).clamp(UVec2::ONE, UVec2::splat(limit)).to_array()
     }
 
     /// How strongly pixels with few samples are smoothed from now on; see [`Renderer::set_smoothing`].
@@ -491,6 +495,8 @@ fn view_settings(look: &Look, size: [u32; 2]) -> ViewSettings {
         tone_map: look.controls.tone_map.into(),
         debug_view: look.controls.shown,
         fill: true,
+        // Two modes are compared by what they have sampled.
+        denoise: look.controls.denoise && look.controls.comparison.is_none(),
         ring: None,
     }
 }

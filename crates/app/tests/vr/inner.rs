@@ -172,6 +172,7 @@ fn each_eye_sees_what_a_headless_render_of_its_pose_shows() {
                 tone_map: ToneMap::AgX,
                 debug_view: DebugView::Beauty,
                 fill: true,
+                denoise: false,
                 ring: None,
             };
             let corner = [half[0] - columns[0], half[1] - rows[0]];

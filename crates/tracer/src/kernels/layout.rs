@@ -5,6 +5,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::upload::decode_octahedral;
+
 /// A 3x3 matrix as a uniform holds it: columns of four.
 pub type Columns3 = [[f32; 4]; 3];
 
@@ -292,8 +294,16 @@ shared! {
     struct FirstHit {
         albedo: [f32; 3],
         depth: f32,
-        normal: [f32; 3],
+        normal: u32,
         steps: u32,
+        deviation: f32,
+        coat: f32,
+    }
+
+    /// What guides the reconstruction of a view at a pixel.
+    struct Guide {
+        position: [f32; 3],
+        packed: u32,
     }
 
     /// One pass over a level of the panorama.
@@ -319,6 +329,13 @@ shared! {
         tone_map: u32,
         linear_target: u32,
         pad_0: u32,
+    }
+}
+
+impl FirstHit {
+    /// The shading normal in the world, on the side of the viewer; zero where nothing is hit.
+    pub fn world_normal(&self) -> glam::Vec3 {
+        if self.depth > 0.0 { decode_octahedral(self.normal) } else { glam::Vec3::ZERO }
     }
 }
 

@@ -74,6 +74,19 @@ impl Renderer {
         Ok(all)
     }
 
+    /// Whether a view shows first hits, or uses them as guides and the adapter can bind as many.
+    pub fn wants_first_hits(&self, settings: &ViewSettings) -> bool {
+        let pixels = u64::from(settings.size[0]) * u64::from(settings.size[1]);
+        let fits = pixels * size_of::<FirstHit>() as u64 <= self.gpu.largest_binding();
+        settings.debug_view.shows_first_hits() || settings.uses_guides() && fits
+    }
+
+    /// Whether [`Renderer::trace_first_hits`] has found all that there is for a view.
+    pub fn knows_first_hits(&self, settings: &ViewSettings) -> bool {
+        let of = self.hits_of(settings);
+        self.view.hits.as_ref().is_some_and(|hits| hits.of == of && hits.rows == of.size[1])
+    }
+
     /// What the ends of a debug view's colours stand for, as it was presented last; `None` where it has no such scale, or nothing
     /// is known yet.
     pub fn debug_scale(&self, debug_view: DebugView) -> Option<DebugScale> {

@@ -39,6 +39,16 @@ fn pack_unorm16(a: f32, b: f32) -> u32 {
     quantise(a) | quantise(b) << 16
 }
 
+/// The unit vector that [`encode_octahedral`] was given, within its error.
+pub fn decode_octahedral(packed: u32) -> Vec3 {
+    let coordinate = |shift: u32| (f32::from((packed >> shift) as u16 as i16) / 32767.0).max(-1.0);
+    let (x, y) = (coordinate(0), coordinate(16));
+    let z = 1.0 - x.abs() - y.abs();
+    let fold = (-z).max(0.0);
+    let unfold = |a: f32| if a >= 0.0 { a - fold } else { a + fold };
+    Vec3::new(unfold(x), unfold(y), z).normalize()
+}
+
 /// Octahedral map of a direction, of any length, to two signed normalised 16-bit numbers (Cigolle et al. 2014); error 5e-5 rad.
 pub fn encode_octahedral(n: Vec3) -> u32 {
     let n = n / (n.x.abs() + n.y.abs() + n.z.abs()).max(1e-20);

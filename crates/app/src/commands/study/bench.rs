@@ -181,6 +181,7 @@ pub fn settings(projection: ViewProjection, size: [u32; 2]) -> ViewSettings {
         tone_map: ToneMap::AgX,
         debug_view: DebugView::Beauty,
         fill: true,
+        denoise: false,
         ring: None,
     }
 }

@@ -18,13 +18,12 @@ const CSF: [[f64; 4]; 3] = [[1.0, 0.0047, 0.0, 1e-5], [1.0, 0.0053, 0.0, 1e-5], 
 /// D65 as the paper's matrix has it.
 const WHITE: [f64; 3] = [0.950_428_545, 1.0, 1.088_900_371];
 
-/// Square pictures, display-encoded sRGB.
+/// Pictures, display-encoded sRGB, row by row.
 pub type Encoded = [[u8; 3]];
 
 /// A picture, ready to be compared.
 #[derive(Clone, Debug)]
 pub struct Prepared {
-    side: usize,
     /// Filtered, in L*a*b* with Hunt's adjustment.
     lab: Vec<[f64; 3]>,
     /// Strength of edges and points.
@@ -32,13 +31,13 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Prepares a picture of `side` x `side` pixels.
-    pub fn new(picture: &Encoded, side: usize) -> Self {
+    /// Prepares a picture that is `width` pixels wide.
+    pub fn new(picture: &Encoded, width: usize) -> Self {
         let opponent: Vec<[f64; 3]> = picture.iter().map(|texel| ycxcz(xyz(linear(*texel)))).collect();
-        let filtered = contrast_filtered(&opponent, side);
+        let filtered = contrast_filtered(&opponent, width);
         let lab = filtered.iter().map(|&c| hunt(lab(clamped_xyz(c)))).collect();
         let achromatic: Vec<f64> = opponent.iter().map(|c| (c[0] + 16.0) / 116.0).collect();
-        Self { side, lab, features: features(&achromatic, side) }
+        Self { lab, features: features(&achromatic, width) }
     }
 
     /// The difference of two pictures of one size, 0..=1 a pixel.
@@ -55,7 +54,7 @@ impl Prepared {
             let feature = (edge.max(point) / 2f64.sqrt()).powf(QF);
             colour.powf(1.0 - feature)
         };
-        (0..self.side * self.side).map(pixel).collect()
+        (0..self.lab.len().min(other.lab.len())).map(pixel).collect()
     }
 }
 
@@ -115,7 +114,7 @@ fn hyab(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// Sums over a square neighbourhood with weights by offset; edges repeat.
 fn convolved<const N: usize>(
     picture: &[[f64; N]],
-    side: usize,
+    width: usize,
     radius: i64,
     weights: impl Fn(i64, i64) -> [f64; N],
 ) -> Vec<[f64; N]> {
@@ -123,22 +122,22 @@ fn convolved<const N: usize>(
         .flat_map(|dy| (-radius..=radius).map(move |dx| (dx, dy)))
         .map(|(x, y)| (x, y, weights(x, y)))
         .collect();
-    let last = side as i64 - 1;
+    let (across, down) = (width as i64, (picture.len() / width) as i64);
     let pixel = |index: usize| {
-        let (x, y) = ((index % side) as i64, (index / side) as i64);
+        let (x, y) = ((index % width) as i64, (index / width) as i64);
         let mut sum = [0.0; N];
         for (dx, dy, weight) in &offsets {
-            let from = picture[((y + dy).clamp(0, last) * side as i64 + (x + dx).clamp(0, last)) as usize];
+            let from = picture[((y + dy).clamp(0, down - 1) * across + (x + dx).clamp(0, across - 1)) as usize];
             for k in 0..N {
                 sum[k] += weight[k] * from[k];
             }
         }
         sum
     };
-    (0..side * side).map(pixel).collect()
+    (0..picture.len()).map(pixel).collect()
 }
 
-fn contrast_filtered(opponent: &[[f64; 3]], side: usize) -> Vec<[f64; 3]> {
+fn contrast_filtered(opponent: &[[f64; 3]], width: usize) -> Vec<[f64; 3]> {
     use std::f64::consts::PI;
     let widest = CSF.iter().flat_map(|c| [c[1], c[3]]).fold(0.0, f64::max);
     let radius = (3.0 * (widest / (2.0 * PI * PI)).sqrt() * PIXELS_PER_DEGREE).ceil() as i64;
@@ -158,14 +157,14 @@ fn contrast_filtered(opponent: &[[f64; 3]], side: usize) -> Vec<[f64; 3]> {
             }
         }
     }
-    convolved(opponent, side, radius, |dx, dy| {
+    convolved(opponent, width, radius, |dx, dy| {
         let w = weight(dx, dy);
         [0, 1, 2].map(|k| w[k] / sum[k])
     })
 }
 
 /// Strength of edges and of points in the achromatic channel.
-fn features(achromatic: &[f64], side: usize) -> Vec<[f64; 2]> {
+fn features(achromatic: &[f64], width: usize) -> Vec<[f64; 2]> {
     let sd = 0.5 * FEATURE_WIDTH_DEG * PIXELS_PER_DEGREE;
     let radius = (3.0 * sd).ceil() as i64;
     let gaussian = |dx: i64, dy: i64| (-((dx * dx + dy * dy) as f64) / (2.0 * sd * sd)).exp();
@@ -186,7 +185,7 @@ fn features(achromatic: &[f64], side: usize) -> Vec<[f64; 2]> {
     let (edge_norms, point_norms) = (norms(&first), norms(&second));
     let normed = |w: f64, [positive, negative]: [f64; 2]| if w > 0.0 { w / positive } else { w / negative };
     let copies: Vec<[f64; 4]> = achromatic.iter().map(|value| [*value; 4]).collect();
-    let filtered = convolved(&copies, side, radius, |dx, dy| {
+    let filtered = convolved(&copies, width, radius, |dx, dy| {
         [
             normed(first(dx, dy), edge_norms),
             normed(first(dy, dx), edge_norms),

@@ -7,11 +7,15 @@ use tracer::view::ViewSettings;
 use super::super::controls::Controls;
 use super::super::engine::Look;
 use super::super::seeing::Seen;
-use super::Tracing;
+use super::{Tracing, view_settings};
 use crate::readback::FIRST_HITS_AT_ONCE;
 
 /// First hits take at most about this long of one picture; the next one goes on.
 const FIRST_HITS_TIME: Duration = Duration::from_millis(200);
+/// Guides are looked for at most this long between two batches, ...
+const GUIDES_TIME: Duration = Duration::from_millis(60);
+/// ... and this long where nothing is traced.
+const GUIDES_TIME_PAUSED: Duration = Duration::from_millis(200);
 /// How often pixels are counted while only samples change.
 const COUNT_INTERVAL: Duration = Duration::from_millis(400);
 
@@ -42,6 +46,25 @@ impl Tracing {
         let start = Instant::now();
         while self.seeing.is_unfinished && start.elapsed() < FIRST_HITS_TIME {
             self.seeing.is_unfinished = !self.renderer()?.trace_first_hits(settings, FIRST_HITS_AT_ONCE)?;
+        }
+        Ok(())
+    }
+
+    /// Whether a picture that is drawn in full is denoised by now; `None` where it is not to be.
+    pub fn is_guided(&self, look: &Look) -> Option<bool> {
+        let settings = view_settings(look, self.picture_size(look, 1));
+        let renderer = self.open.as_ref()?.renderer.as_ref()?;
+        let is_wanted = settings.uses_guides() && renderer.wants_first_hits(&settings);
+        is_wanted.then(|| renderer.knows_first_hits(&settings))
+    }
+
+    /// Goes on with finding what guides the picture, for a short time.
+    pub fn find_guides(&mut self, look: &Look) -> anyhow::Result<()> {
+        let settings = view_settings(look, self.picture_size(look, 1));
+        let most = if look.controls.paused { GUIDES_TIME_PAUSED } else { GUIDES_TIME };
+        let start = Instant::now();
+        while self.is_guided(look) == Some(false) && start.elapsed() < most {
+            self.renderer()?.trace_first_hits(&settings, FIRST_HITS_AT_ONCE)?;
         }
         Ok(())
     }

@@ -78,6 +78,7 @@ pub(super) fn prefer(args: &PreviewArgs, kept: &Preferences, controls: &mut Cont
     controls.adaptive = kept.adaptive.filter(|_| !stated("adaptive")).unwrap_or(controls.adaptive);
     controls.exposure_ev = kept.exposure_ev.filter(|_| !stated("exposure")).unwrap_or(controls.exposure_ev);
     controls.tone_map = kept.tone_map.filter(|_| !stated("tonemap")).unwrap_or(controls.tone_map);
+    controls.denoise = kept.denoise.filter(|_| !stated("denoise")).unwrap_or(controls.denoise);
     if let Some(panels) = kept.panels {
         *visibility = Visibility { gaze: visibility.gaze || panels.gaze, ..panels };
     }
@@ -236,6 +237,7 @@ impl Window {
             adaptive: Some(self.controls.adaptive),
             exposure_ev: Some(self.controls.exposure_ev),
             tone_map: Some(self.controls.tone_map),
+            denoise: Some(self.controls.denoise),
             panels: Some(Visibility { keys: false, ..self.visibility }),
             window: files.place,
             folder: files.folder.clone(),
@@ -302,6 +304,7 @@ mod tests {
             adaptive: Some(true),
             exposure_ev: Some(2.0),
             tone_map: Some(ToneMapping::Linear),
+            denoise: Some(false),
             panels: Some(Visibility { editor: true, ring: false, ..Visibility::default() }),
             ..Preferences::default()
         };
@@ -309,12 +312,13 @@ mod tests {
             let args = args(line);
             let (mut controls, mut visibility) = (Controls::from(&args), Visibility::default());
             prefer(&args, &kept, &mut controls, &mut visibility);
+            assert_eq!(controls.denoise, line.contains("denoise"), "{line}");
             let picture = (controls.exposure_ev, controls.tone_map);
             (controls.mode, controls.adaptive, picture, visibility.editor, visibility.ring)
         };
         assert_eq!(preferred(""), (Mode::Od, true, (2.0, ToneMapping::Linear), true, false));
         // A default that is asked for is asked for.
-        let asked = preferred("--mode fv --exposure 0 --tonemap agx");
+        let asked = preferred("--mode fv --exposure 0 --tonemap agx --denoise on");
         assert_eq!(asked, (Mode::Fv, true, (0.0, ToneMapping::Agx), true, false));
     }
 
