@@ -14,7 +14,7 @@ pub fn write(path: &Path, [width, height]: [u32; 2], texels: &[[f32; 3]]) -> Res
     Ok(std::fs::write(path, bytes)?)
 }
 
-/// Reads a picture of a known size that [`write`] or its like has written.
+/// Reads a picture of a known size that [`write()`] or its like has written.
 pub fn read(path: &Path, [width, height]: [u32; 2]) -> Result<Vec<[f32; 3]>, AnyError> {
     let bytes = std::fs::read(path)?;
     let header = format!("PF\n{width} {height}\n-1.0\n");
