@@ -8,7 +8,7 @@
 //! **The weight** is [`FLOOR`] plus a part in proportion to the standard deviation of a single sample as it is seen, which
 //! minimises the sum of the cells' variances (Neyman 1934); where the standard error has fallen below [`VISIBLE_ERROR`], by its
 //! square over that of the threshold less. *As it is seen*: of luminance after a global tone map x / (1 + x) about the median cell
-//! (Reinhard et al. 2002), relative to that value and [`DARK`].
+//! (Reinhard et al. 2002), relative to that value and 0.05, which the eye adds.
 
 use crate::kernels::layout::CellNoise;
 
