@@ -30,7 +30,7 @@ const BLOCK_RADIUS_PX: usize = 3;
 /// The pixels around likewise.
 pub const AROUND_RADIUS_PX: u32 = 10;
 /// What is known from around is forgotten as a pixel gets many more samples than this.
-const PRIOR_SAMPLES: f64 = 64.0;
+pub const PRIOR_SAMPLES: f64 = 64.0;
 /// Luminance below this share of 1 counts as this much: black has no relative error.
 const DARKEST: f64 = 1e-3;
 /// The same place, for the estimate of the time left: radians.
