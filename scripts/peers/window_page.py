@@ -28,7 +28,7 @@ def slider(figures):
 
 `scripts/window_report slider`. "Transmission" of one material of the built-in room, whose other materials are opaque here, is dragged
 from 0 to 0.1 and back eight times. Without transmission and with it the room needs different kernels; the new one took
-{figures['kernel_ms'] / 1e3:.1f} s to compile. Time from one frame of the window to the next while the button was held, with a frame asked for at
+{figures['kernel_ms'] / 1e3:.1f} s to compile beside the window, which goes first. Time from one frame to the next while the button was held, with a frame asked for at
 least every 10 ms:
 
 | frames | median ms | 99 % below ms | longest ms |
