@@ -32,8 +32,8 @@ mod compare;
 mod seeing;
 
 /// Samples at which a pixel counts as much as what is around it and what was there before, while the picture moves. With 1 up to 2.2 %
-/// of a moving picture of the built-in scene were black, with 16 up to 0.22 % (`tests/films/moving.rs`).
-pub const SMOOTHING_WHILE_MOVING: f32 = 16.0;
+/// of a moving picture of the built-in scene were black, with 16 up to 0.22 %, with 32 none (`tests/films/moving.rs`).
+pub const SMOOTHING_WHILE_MOVING: f32 = 32.0;
 
 /// Where a head looks.
 #[derive(Clone, Copy, Debug)]

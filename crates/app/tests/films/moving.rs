@@ -58,7 +58,7 @@ fn a_moving_picture_has_no_holes_and_does_not_flicker() {
         let (low, high) = scene.bounds().unwrap();
         let pivot = (low + high) * 0.5;
         let mut last: Option<f64> = None;
-        let (mut largest_change, mut most_black, mut sum_black) = (0.0f64, 0.0f64, 0.0);
+        let (mut largest_change, mut most_black) = (0.0f64, 0.0f64);
         for frame in 0..FRAMES {
             // It starts with nothing but a first batch. The view goes about the scene, then forwards, and then an object is
             // dragged, each of which starts the film anew.
@@ -81,14 +81,12 @@ fn a_moving_picture_has_no_holes_and_does_not_flicker() {
             eprintln!("{mode} frame {frame}: {:.3} % black, brightness {brightness:.1}", 100.0 * black);
             largest_change = largest_change.max(change);
             most_black = most_black.max(black);
-            sum_black += black;
             last = Some(brightness);
         }
         eprintln!("{mode}: at most {:.3} % black, {:.2} % change", 100.0 * most_black, 100.0 * largest_change);
         // Samples that found no light may lie together where there are few. Without smoothing FV has 2.2 % at most, 1.1 % on average,
         // and its brightness changes by 4 %.
-        let mean_black = sum_black / f64::from(FRAMES);
-        assert!(most_black <= 5e-3 && mean_black <= 1e-3, "{mode}: {most_black}, mean {mean_black}");
+        assert!(most_black <= 5e-4, "{mode}: {most_black}");
         assert!(largest_change < 0.02, "{mode}: {largest_change}");
 
         // Without a sample, as while tracing is paused, the last picture stands in, also where it does not reach.

@@ -10,7 +10,7 @@ use crate::preview::tracing::SMOOTHING_WHILE_MOVING;
 /// How long after the last movement the picture is drawn in full again.
 const SETTLED: Duration = Duration::from_millis(250);
 /// In which time from then on the smoothing ends, if there are enough samples.
-const SHARPENS: Duration = Duration::from_secs(2);
+const SHARPENS: Duration = Duration::from_millis(2200);
 /// Samples for each pixel of the view, on average, that are enough.
 const ENOUGH: f64 = 0.5;
 /// A picture that takes longer than this is drawn coarser while it moves.
