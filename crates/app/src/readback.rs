@@ -27,7 +27,7 @@ pub fn picture_texture(gpu: &Gpu, size: [u32; 2]) -> wgpu::Texture {
     })
 }
 
-/// A texture that egui shows, [`write_texture`] fills and [`read_texture`] reads.
+/// A texture that the window shows and [`write_texture`] fills.
 pub fn upload_texture(gpu: &Gpu, size: [u32; 2]) -> wgpu::Texture {
     gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: Some("mirror"),
@@ -36,7 +36,7 @@ pub fn upload_texture(gpu: &Gpu, size: [u32; 2]) -> wgpu::Texture {
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
         format: PICTURE_FORMAT,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC,
+        usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
         view_formats: &[],
     })
 }

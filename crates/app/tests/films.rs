@@ -127,8 +127,6 @@ fn what_does_not_belong_together_is_refused_and_nothing_is_written() {
     assert_eq!(folder.names(), before);
 }
 
-/// Films of other seeds and lengths add up to a film whose mean and stated variance are right: a chi-squared test of
-/// the pixels that are noisy against a longer render, at a significance of 0.2 %, two-sided.
 #[test]
 fn an_adaptive_film_is_the_same_every_time_and_says_what_it_is() {
     let folder = Folder::new("adaptive");
@@ -144,6 +142,8 @@ fn an_adaptive_film_is_the_same_every_time_and_says_what_it_is() {
     assert_eq!(steered(&sum), steered(&first));
 }
 
+/// Films of other seeds and lengths add up to a film whose mean and stated variance are right: a chi-squared test of
+/// the pixels that are noisy against a longer render, at a significance of 0.2 %, two-sided.
 #[test]
 fn films_of_different_seeds_merge_to_a_valid_estimate() {
     let folder = Folder::new("seeds");
