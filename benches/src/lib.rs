@@ -10,6 +10,9 @@ use tracer::{
     scene::{Backdrop, ContentHash, Environment, Instance, Material, Mesh, Scene},
 };
 
+pub mod baseline;
+pub mod family;
+
 /// A scene of one far triangle under a constant sky: almost nothing but ray generation.
 pub fn one_triangle() -> Scene {
     let positions = vec![Vec3::new(0.0, 1e3, -1e3), Vec3::new(1.0, 1e3, -1e3), Vec3::new(0.0, 1e3 + 1.0, -1e3)];

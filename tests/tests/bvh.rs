@@ -56,7 +56,8 @@ fn ray(number: u32) -> (DVec3, DVec3) {
 
 const IMPORTS: &str = "
 import package::sampler::hash_u32;
-import package::path_bindings::{triangles, instances};
+import package::path_bindings::instances;
+import package::scene::tables::triangle_at;
 import package::types::TRIANGLE_ALPHA;
 import package::scene::traverse::{Ray, HitPair, RAY_ANY, RAY_CLOSEST};
 @if(ALPHA) import package::scene::alpha::trace_through;
@@ -92,8 +93,8 @@ const BODY: &str = "
     let any = hits.first;
     let hit = hits.second;
     if hit.instance != NONE {
-        let number = triangles[hit.triangle].w & ~TRIANGLE_ALPHA;
-        let source = instances[part_of(hit.instance, triangles[hit.triangle].x)].material;
+        let number = triangle_at(hit.triangle).w & ~TRIANGLE_ALPHA;
+        let source = instances[part_of(hit.instance, triangle_at(hit.triangle).x)].material;
         radiance = vec3f(hit.t * 0.00390625, f32(number) * 0.00000095367431640625, f32(source + 1u) * 0.00390625);
     }
     if (any.instance != NONE) != (hit.instance != NONE) {

@@ -15,9 +15,6 @@ use crate::gpu::Gpu;
 
 mod binary;
 
-/// Bytes of a node on the GPU.
-pub const NODE_BYTES: usize = size_of::<Node>();
-
 /// A node as the kernels read it, of either kind of hierarchy: a CWBVH's, or a pair of children.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]

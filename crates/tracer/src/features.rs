@@ -30,6 +30,9 @@ features! {
     Instances = "INSTANCES",
     /// Nodes of the hierarchies have two children instead of eight.
     BinaryNodes = "BINARY_NODES",
+    /// The geometry's tables are texture pages instead of storage buffers: one is larger than a binding, or the driver reads
+    /// textures faster.
+    GeometryTextures = "GEOMETRY_TEXTURES",
     /// Some instance has alpha mask or blend: candidates pass an alpha test.
     Alpha = "ALPHA",
     /// Some material has a texture.
@@ -91,6 +94,7 @@ impl Feature {
             self,
             Self::Instances
                 | Self::BinaryNodes
+                | Self::GeometryTextures
                 | Self::EnvironmentImage
                 | Self::PerspectiveFilm
                 | Self::Guided

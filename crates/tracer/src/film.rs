@@ -91,6 +91,9 @@ pub(crate) struct Film {
 impl Film {
     /// Allocates a film; `None` when the device has no memory for it.
     pub fn new(gpu: &Gpu, options: FilmOptions) -> Option<Self> {
+        if gpu.lacks_memory(options.bytes()) {
+            return None;
+        }
         let row_bytes = u64::from(options.width) * u64::from(FILM_WORDS) * 4;
         let rows_per_slab = (gpu.largest_binding() / row_bytes).clamp(1, u64::from(options.height)) as u32;
         let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);

@@ -63,6 +63,18 @@ pub struct AdapterDescription {
     pub is_default: bool,
 }
 
+/// Where the geometry's tables are on the device.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum GeometryPlace {
+    /// In storage buffers, except where one would be larger than the adapter binds, or where the driver reads textures faster.
+    #[default]
+    Auto,
+    /// In storage buffers; a table that is larger than the adapter binds is an error.
+    Buffers,
+    /// In texture pages.
+    Textures,
+}
+
 /// A device and its queue, ready for the tracer. Cheap to clone.
 #[derive(Clone, Debug)]
 pub struct Gpu {
@@ -74,6 +86,7 @@ pub struct Gpu {
     pub queue: wgpu::Queue,
     info: Arc<wgpu::AdapterInfo>,
     lost: Arc<AtomicBool>,
+    geometry: GeometryPlace,
 }
 
 /// The device stopped answering: its driver was reset, or it was destroyed. Another one must be made.
@@ -82,7 +95,7 @@ pub struct Gpu {
 pub struct DeviceLost;
 
 /// Storage buffers that the largest kernel binds in one stage.
-const STORAGE_BUFFERS: u32 = 9;
+const STORAGE_BUFFERS: u32 = 10;
 /// Smallest storage binding that the tracer works with: wgpu's default.
 const SMALLEST_BINDING: u64 = 128 << 20;
 
@@ -121,7 +134,7 @@ impl Gpu {
         if shortfalls.is_empty() {
             let lost = Arc::new(AtomicBool::new(false));
             watch(&device, &lost);
-            Ok(Self { adapter, device, queue, info: Arc::new(info), lost })
+            Ok(Self { adapter, device, queue, info: Arc::new(info), lost, geometry: GeometryPlace::default() })
         } else {
             Err(GpuError::Unfit { adapter: info.name, shortfalls: shortfalls.join("; ") })
         }
@@ -221,11 +234,55 @@ impl Gpu {
         buffer
     }
 
+    /// This device with the geometry of scenes that are set from now on elsewhere: for tests and comparisons.
+    #[must_use]
+    pub fn with_geometry_in(self, geometry: GeometryPlace) -> Self {
+        Self { geometry, ..self }
+    }
+
+    /// Whether geometry whose tables have these sizes in bytes is to be in storage buffers.
+    pub(crate) fn keeps_in_buffers(&self, tables: [u64; 4]) -> bool {
+        match self.geometry {
+            GeometryPlace::Auto => {
+                tables.iter().all(|&bytes| bytes <= self.largest_binding()) && !self.reads_textures_faster()
+            }
+            GeometryPlace::Buffers => true,
+            GeometryPlace::Textures => false,
+        }
+    }
+
+    /// lavapipe of Mesa 22 reads storage buffers lane by lane with a comparison for each (docs/ARCHITECTURE.md).
+    fn reads_textures_faster(&self) -> bool {
+        self.info.driver == "llvmpipe" && self.info.driver_info.starts_with("Mesa 22.")
+    }
+
+    /// Bytes of memory that are free for buffers and textures, where that can be known: on a software adapter under Linux, whose
+    /// memory is the machine's. The system would not refuse more, but end the program later.
+    pub fn free_memory(&self) -> Option<u64> {
+        if !self.is_software() {
+            return None;
+        }
+        // See proc_meminfo(5); the unit is 1024 bytes.
+        let table = std::fs::read_to_string("/proc/meminfo").ok()?;
+        let row = table.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
+        row.split_whitespace().next()?.parse::<u64>().ok().map(|kibibytes| kibibytes << 10)
+    }
+
+    /// Whether so many bytes more are surely too much for the device.
+    pub(crate) fn lacks_memory(&self, bytes: u64) -> bool {
+        self.free_memory().is_some_and(|free| bytes > free)
+    }
+
     /// Bytes that one storage binding may have.
     pub fn largest_binding(&self) -> u64 {
         let limits = self.device.limits();
         limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
     }
+}
+
+/// What is known of free memory, as the end of an error's sentence.
+pub(crate) fn free_text(free: &Option<u64>) -> String {
+    free.map_or_else(String::new, |bytes| format!("; {bytes} bytes are free"))
 }
 
 /// Notes when the device is lost. What wgpu complains of afterwards is a consequence; before, it is a fault of ours.

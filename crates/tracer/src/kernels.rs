@@ -49,6 +49,7 @@ const MODULES: &[(&str, &str)] = &[
     ("sampling::noise", include_str!("../../../shaders/sampling/noise.wesl")),
     ("film::mapping", include_str!("../../../shaders/film/mapping.wesl")),
     ("film::accumulate", include_str!("../../../shaders/film/accumulate.wesl")),
+    ("scene::tables", include_str!("../../../shaders/scene/tables.wesl")),
     ("scene::traverse", include_str!("../../../shaders/scene/traverse.wesl")),
     ("scene::texture", include_str!("../../../shaders/scene/texture.wesl")),
     ("scene::alpha", include_str!("../../../shaders/scene/alpha.wesl")),

@@ -31,7 +31,7 @@ use crate::{
     distribution::Distribution,
     features::{Feature, SceneFeatures},
     film::{Film, FilmMapping, FilmOptions, FilmPixel, LAST_SAMPLE, PixelsNear, ReadError, SampleRange},
-    gpu::Gpu,
+    gpu::{Gpu, free_text},
     kernels::{
         self, Kernel, KernelConstants, KernelKey, ShaderSources,
         layout::{BatchParams, SampleRecord},
@@ -55,7 +55,10 @@ pub enum RenderError {
     #[error(transparent)]
     Read(#[from] ReadError),
     /// The film is larger than the device's memory.
-    #[error("a film of {width}x{height} pixels needs {bytes} bytes, more than adapter {adapter} can give")]
+    #[error(
+        "a film of {width}x{height} pixels needs {bytes} bytes, more than adapter {adapter} can give{}",
+        free_text(free)
+    )]
     FilmTooLarge {
         /// Pixels.
         width: u32,
@@ -65,6 +68,8 @@ pub enum RenderError {
         bytes: u64,
         /// Its name.
         adapter: String,
+        /// Bytes of memory that are free, where that is known.
+        free: Option<u64>,
     },
     /// Tracing was asked for before a scene was set.
     #[error("no scene to trace")]
@@ -520,6 +525,7 @@ fn allocate_film(gpu: &Gpu, options: FilmOptions) -> Result<(Film, Vec<wgpu::Buf
         height: options.height,
         bytes: options.bytes(),
         adapter: gpu.info().name.clone(),
+        free: gpu.free_memory(),
     };
     if options.pixels() > u64::from(u32::MAX) || u64::from(options.width) * 40 > gpu.largest_binding() {
         return Err(too_large());

@@ -7,9 +7,9 @@ use thiserror::Error;
 use wgpu::util::DeviceExt;
 
 use crate::{
-    bvh::{HierarchyKind, NODE_BYTES},
+    bvh::HierarchyKind,
     features::{Feature, SceneFeatures},
-    gpu::Gpu,
+    gpu::{Gpu, free_text},
     kernels::KernelConstants,
     scene::{Environment, Scene},
 };
@@ -21,7 +21,9 @@ mod environment;
 mod geometry;
 mod lights;
 mod materials;
+mod pages;
 mod placement;
+mod tables;
 mod texels;
 mod vertices;
 
@@ -29,7 +31,9 @@ pub(crate) use vertices::decode_octahedral;
 
 pub use alias::AliasTable;
 pub use cache::SceneCache;
+use pages::Pages;
 use placement::Placement;
+use tables::Tables;
 
 /// Why a scene cannot go to the device.
 #[derive(Debug, Error)]
@@ -47,12 +51,16 @@ pub enum UploadError {
         adapter: String,
     },
     /// The device has no memory left for it.
-    #[error("the device has no room for the scene's {what} ({bytes} bytes)")]
+    #[error("the scene's {what} need {bytes} bytes, more than adapter {adapter} can give{}", free_text(free))]
     OutOfMemory {
         /// Which data.
         what: &'static str,
         /// What they need.
         bytes: u64,
+        /// Its name.
+        adapter: String,
+        /// Bytes of memory that are free, where that is known.
+        free: Option<u64>,
     },
 }
 
@@ -105,10 +113,12 @@ pub struct SceneOnGpu {
 /// Group 1 of the path kernels.
 #[derive(Clone, Debug)]
 pub struct SceneBindings {
-    /// Storage buffers, binding 0 to 7.
+    /// Storage buffers, binding 0 to 7; the first four hold nothing where the geometry is in textures.
     pub buffers: [wgpu::Buffer; 8],
     /// Textures, binding 8 to 12.
     pub textures: [wgpu::TextureView; 5],
+    /// The geometry's tables where they are textures, binding 13 to 16.
+    pub geometry: Option<[wgpu::TextureView; 4]>,
 }
 
 /// Uploads buffers and keeps count.
@@ -166,6 +176,16 @@ impl Uploader<'_> {
         Err(UploadError::TooLarge { what, bytes, limit, adapter: self.gpu.info().name.clone() })
     }
 
+    /// That there is room for so many bytes more, as far as that can be known beforehand.
+    fn check_memory(&self, what: &'static str, bytes: u64) -> Result<(), UploadError> {
+        if self.gpu.lacks_memory(bytes) { Err(self.out_of_memory(what, bytes)) } else { Ok(()) }
+    }
+
+    fn out_of_memory(&self, what: &'static str, bytes: u64) -> UploadError {
+        let adapter = self.gpu.info().name.clone();
+        UploadError::OutOfMemory { what, bytes, adapter, free: self.gpu.free_memory() }
+    }
+
     fn count_new(&mut self, bytes: u64) {
         self.device_bytes += bytes;
         self.uploaded_bytes += bytes;
@@ -211,19 +231,26 @@ impl SceneOnGpu {
         let split = cache.split(scene);
         let shapes = cache.shapes(scene, &split, &mut uploader)?;
         let shapes_secs = started.elapsed().as_secs_f64();
-        let mut placement = Placement::of(scene, &split, cache.hierarchy(), &shapes.shapes, shapes.node_count);
+        let upper_root = shapes.tables.upper_root(shapes.node_count);
+        let mut placement = Placement::of(scene, &split, cache.hierarchy(), &shapes.shapes, upper_root);
         let light_table = lights::LightTable::build(scene, &shapes.shapes, &mut placement);
         let texels = cache.texels(scene, &mut uploader)?;
         let (materials, slots) = materials::encode(scene, &texels.offsets);
         let environment = cache.environment(&scene.environment, &mut uploader)?;
         let features = SceneFeatures::of(scene);
         let lobe_tables = cache.lobe_tables(features, &mut uploader);
-        let [shape_nodes, positions, triangles, vertices] = shapes.buffers.clone();
-        let nodes = if placement.nodes.is_empty() {
-            shape_nodes
+        let tables = if placement.nodes.is_empty() {
+            shapes.tables.clone()
         } else {
-            let [head, at] = [shapes.node_count, placement.root].map(|nodes| u64::from(nodes) * NODE_BYTES as u64);
-            uploader.appended("hierarchy nodes", (&shape_nodes, head), (at, &placement.nodes))?
+            shapes.tables.with_upper_level(shapes.node_count, placement.root, &placement.nodes, &mut uploader)?
+        };
+        let geometry_bytes = tables.bytes();
+        let ([nodes, positions, triangles, vertices], geometry) = match tables {
+            Tables::Buffers(buffers) => (buffers, None),
+            Tables::Textures(tables) => {
+                let none = uploader.storage::<u32>("no geometry", &[])?;
+                (std::array::from_fn(|_| none.clone()), Some(tables.map(|pages: Pages| pages.view)))
+            }
         };
         let buffers = [
             nodes,
@@ -235,9 +262,8 @@ impl SceneOnGpu {
             cache.table("texture slots", &slots, &mut uploader)?,
             cache.table("lights", &light_table.lights, &mut uploader)?,
         ];
-        let geometry_bytes = buffers[..4].iter().map(wgpu::Buffer::size).sum();
         if pollster::block_on(scope.pop()).is_some() {
-            return Err(UploadError::OutOfMemory { what: "buffers and textures", bytes: uploader.device_bytes });
+            return Err(uploader.out_of_memory("buffers and textures", uploader.device_bytes));
         }
 
         let light_count = light_table.lights.len() as u32;
@@ -253,6 +279,7 @@ impl SceneOnGpu {
             features: features
                 .with(Feature::Lights, light_count > 0)
                 .with(Feature::Instances, !placement.is_single_level)
+                .with(Feature::GeometryTextures, geometry.is_some())
                 .with(Feature::BinaryNodes, cache.hierarchy() == HierarchyKind::Binary),
             constants: KernelConstants {
                 stack_size: placement.stack_size,
@@ -268,6 +295,7 @@ impl SceneOnGpu {
                     environment.cells.clone(),
                     lobe_tables,
                 ],
+                geometry,
             },
             sources: placement.sources,
             light_count,

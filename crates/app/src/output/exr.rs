@@ -75,15 +75,19 @@ pub fn write(path: &Path, file: &FilmFile) -> std::result::Result<(), OutputErro
     let FilmFile { film, settings } = file;
     let size = (film.header.options.width as usize, film.header.options.height as usize);
     film.check().map_err(|error| OutputError::Unwritable { path: path.to_owned(), reason: error.to_string() })?;
-    let pixels: Vec<_> = film.pixels().collect();
-    let component = |index: usize| FlatSamples::F32(pixels.iter().map(|pixel| pixel.mean[index] as f32).collect());
-    let variance = FlatSamples::F32(pixels.iter().map(|pixel| pixel.variance_of_mean as f32).collect());
+    // One after the other, since the largest films fill half of the memory as they are.
+    let mut floats = ["R", "G", "B", "variance"].map(|name| (name, Vec::with_capacity(size.0 * size.1)));
+    for pixel in film.pixels() {
+        let [red, green, blue] = pixel.mean;
+        for ((_, values), value) in floats.iter_mut().zip([red, green, blue, pixel.variance_of_mean]) {
+            values.push(value as f32);
+        }
+    }
     let words = WORDS.iter().enumerate().map(|(word, name)| {
         let values = film.words.iter().skip(word).step_by(WORDS.len()).copied();
         AnyChannel::new(*name, FlatSamples::U32(values.collect()))
     });
-    let floats = [("R", component(0)), ("G", component(1)), ("B", component(2)), ("variance", variance)];
-    let floats = floats.into_iter().map(|(name, values)| AnyChannel::new(name, values));
+    let floats = floats.into_iter().map(|(name, values)| AnyChannel::new(name, FlatSamples::F32(values)));
     let channels = AnyChannels::sort(floats.chain(words).collect());
     let mut attributes = LayerAttributes {
         software_name: Text::new_or_none(concat!("fovea ", env!("CARGO_PKG_VERSION"))),

@@ -218,9 +218,14 @@ fn reflect(
             }),
             _ if is_sampler(variable) => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
             _ => {
-                let arrayed = matches!(module.types[variable.ty].inner, naga::TypeInner::Image { arrayed: true, .. });
+                let naga::TypeInner::Image { arrayed, class, .. } = module.types[variable.ty].inner else { continue };
+                let holds_words = matches!(class, naga::ImageClass::Sampled { kind: naga::ScalarKind::Uint, .. });
                 wgpu::BindingType::Texture {
-                    sample_type: wgpu::TextureSampleType::Float { filterable },
+                    sample_type: if holds_words {
+                        wgpu::TextureSampleType::Uint
+                    } else {
+                        wgpu::TextureSampleType::Float { filterable }
+                    },
                     view_dimension: if arrayed {
                         wgpu::TextureViewDimension::D2Array
                     } else {

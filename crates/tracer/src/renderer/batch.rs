@@ -203,6 +203,7 @@ pub(super) fn trace_groups(
 pub(super) fn scene_group(device: &wgpu::Device, kernel: &Pipeline, scene: &SceneOnGpu) -> Option<wgpu::BindGroup> {
     let buffers = scene.bindings.buffers.iter().map(wgpu::Buffer::as_entire_binding);
     let textures = scene.bindings.textures.iter().map(wgpu::BindingResource::TextureView);
-    let resources: Vec<_> = (0..).zip(buffers.chain(textures)).collect();
+    let geometry = scene.bindings.geometry.iter().flatten().map(wgpu::BindingResource::TextureView);
+    let resources: Vec<_> = (0..).zip(buffers.chain(textures).chain(geometry)).collect();
     kernel.bind(device, 1, &resources)
 }

@@ -56,6 +56,8 @@ pub struct QueryAnswer {
     pub instance: u32,
     /// Index of the triangle in the instance's mesh.
     pub triangle: u32,
+    /// Nodes and triangles that were looked at.
+    pub steps: u32,
 }
 
 /// Rays that one dispatch answers.
@@ -76,7 +78,7 @@ impl Renderer {
             let scene = self.scene.as_ref().ok_or(RenderError::NoScene)?;
             answers.extend(hits.iter().map(|hit| {
                 let instance = (*scene.sources.get(hit.part as usize)?)?;
-                Some(QueryAnswer { t: hit.t, instance, triangle: hit.triangle })
+                Some(QueryAnswer { t: hit.t, instance, triangle: hit.triangle, steps: hit.steps })
             }));
         }
         Ok((answers, seconds))

@@ -12,6 +12,7 @@ use super::{
     albedo::{self, TABLE_FEATURES},
     environment::EnvironmentOnGpu,
     geometry::{BlasCache, Shapes, Split},
+    tables::Tables,
     texels::TexelHeap,
 };
 use crate::{
@@ -31,8 +32,7 @@ pub(super) struct ShapesOnGpu {
     /// Without nodes and positions, which nothing on the host needs any more.
     pub shapes: Shapes,
     pub node_count: u32,
-    /// Nodes, positions, triangles, vertices.
-    pub buffers: [wgpu::Buffer; 4],
+    pub tables: Tables,
     bytes: u64,
 }
 
@@ -110,16 +110,11 @@ impl SceneCache {
         self.shapes = None;
         let mut shapes = Shapes::build(scene, split, self.hierarchy, &mut self.blas);
         let before = uploader.device_bytes;
-        let buffers = [
-            uploader.storage("hierarchy nodes", &shapes.nodes)?,
-            uploader.storage("triangle positions", &shapes.positions)?,
-            uploader.storage("triangles", &shapes.triangles)?,
-            uploader.storage("vertices", &shapes.vertices)?,
-        ];
+        let tables = Tables::upload(&shapes, split.first_part() as usize, uploader)?;
         let bytes = uploader.device_bytes - before;
         let node_count = shapes.nodes.len() as u32;
         (shapes.nodes, shapes.positions) = (Vec::new(), Vec::new());
-        let on_gpu = Arc::new(ShapesOnGpu { shapes, node_count, buffers, bytes });
+        let on_gpu = Arc::new(ShapesOnGpu { shapes, node_count, tables, bytes });
         self.shapes = Some((hash, on_gpu.clone()));
         Ok(on_gpu)
     }

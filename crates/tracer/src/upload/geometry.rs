@@ -60,7 +60,7 @@ pub(super) struct Shapes {
     /// Per triangle: its three vertices, and its number in its mesh with [`codes::TRIANGLE_ALPHA`].
     pub triangles: Vec<[u32; 4]>,
     pub vertices: Vec<layout::Vertex>,
-    /// Of each placed mesh in ascending order, then of the static mesh if there is one.
+    /// Of each placed mesh in ascending order, then of the static mesh if there is one; so their roots ascend too.
     pub pieces: Vec<PlacedBlas>,
 }
 
@@ -98,9 +98,10 @@ impl Split {
             bytes.push(u8::from(passes_light(scene, instance)));
         }
         bytes.extend(b"placed");
+        let passing = meshes_passing_light(scene);
         for &mesh in &self.meshes {
             bytes.extend(scene.meshes[mesh as usize].hash.0.to_le_bytes());
-            bytes.push(u8::from(mesh_passes_light(scene, mesh)));
+            bytes.push(u8::from(passing[mesh as usize]));
         }
         ContentHash::of(&[&bytes])
     }
@@ -113,7 +114,9 @@ impl Split {
 
 impl Shapes {
     pub(super) fn build(scene: &Scene, split: &Split, kind: HierarchyKind, cache: &mut BlasCache) -> Self {
-        let mut pieces: Vec<Piece> = split.meshes.par_iter().map(|&m| own_piece(scene, m)).collect();
+        let passing = meshes_passing_light(scene);
+        let own = split.meshes.par_iter().map(|&m| own_piece(&scene.meshes[m as usize], passing[m as usize]));
+        let mut pieces: Vec<Piece> = own.collect();
         if !split.fixed.is_empty() {
             pieces.push(static_piece(scene, &split.fixed, split.first_part()));
         }
@@ -133,7 +136,8 @@ impl Shapes {
 
     /// Number in its mesh and slot of every triangle of the piece whose root node this is.
     pub(super) fn slots_below(&self, root: u32) -> impl Iterator<Item = (u32, u32)> + '_ {
-        let range = self.pieces.iter().find(|piece| piece.root == root).map_or(0..0, |piece| piece.triangles.clone());
+        let piece = self.pieces.binary_search_by_key(&root, |piece| piece.root);
+        let range = piece.map_or(0..0, |piece| self.pieces[piece].triangles.clone());
         range.map(|slot| (self.triangles[slot as usize][3] & !codes::TRIANGLE_ALPHA, slot))
     }
 
@@ -169,9 +173,7 @@ fn build_hierarchies(pieces: &[Piece], kind: HierarchyKind, cache: &mut BlasCach
     blas
 }
 
-fn own_piece(scene: &Scene, mesh: u32) -> Piece {
-    let passes_light = mesh_passes_light(scene, mesh);
-    let mesh = &*scene.meshes[mesh as usize];
+fn own_piece(mesh: &Mesh, passes_light: bool) -> Piece {
     Piece {
         hash: mesh.hash,
         positions: mesh.positions.clone(),
@@ -186,8 +188,13 @@ fn numbers(mesh: &Mesh, passes_light: bool) -> Vec<u32> {
     (0..mesh.triangles.len() as u32).map(|number| number | flag).collect()
 }
 
-fn mesh_passes_light(scene: &Scene, mesh: u32) -> bool {
-    scene.instances.iter().any(|i| i.mesh == mesh && passes_light(scene, i))
+/// For each mesh, whether some instance of it passes light.
+fn meshes_passing_light(scene: &Scene) -> Vec<bool> {
+    let mut passing = vec![false; scene.meshes.len()];
+    for instance in scene.instances.iter().filter(|i| passes_light(scene, i)) {
+        passing[instance.mesh as usize] = true;
+    }
+    passing
 }
 
 fn passes_light(scene: &Scene, instance: &Instance) -> bool {

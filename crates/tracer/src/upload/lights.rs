@@ -25,6 +25,7 @@ impl LightTable {
         let mut powers = Vec::new();
         let mut twins = Twins::default();
         let mut brightest: f32 = 0.0;
+        let mut means: HashMap<u32, Vec3> = HashMap::new();
         for (index, source) in placement.sources.iter().enumerate() {
             let Some(source) = *source else { continue };
             let instance = &scene.instances[source as usize];
@@ -34,9 +35,10 @@ impl LightTable {
             }
             placement.instances[index].first_light = lights.len() as u32;
             brightest = brightest.max(material.emission.max_element());
-            let mean = material
-                .emissive_texture
-                .map_or(Vec3::ONE, |reference| mean_color(&scene.textures[reference.texture as usize]));
+            let mean = material.emissive_texture.map_or(Vec3::ONE, |reference| {
+                let texture = reference.texture;
+                *means.entry(texture).or_insert_with(|| mean_color(&scene.textures[texture as usize]))
+            });
             let sides = if material.double_sided { 2.0 } else { 1.0 };
             // Black texels in a dark texture still must be reachable where its mean is not zero elsewhere.
             let radiance = f64::from(luminance(material.emission * mean.max(Vec3::splat(1e-4)))) * sides;

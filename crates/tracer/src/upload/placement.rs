@@ -26,7 +26,7 @@ pub(super) struct Placement {
 }
 
 impl Placement {
-    pub(super) fn of(scene: &Scene, split: &Split, kind: HierarchyKind, shapes: &Shapes, shape_nodes: u32) -> Self {
+    pub(super) fn of(scene: &Scene, split: &Split, kind: HierarchyKind, shapes: &Shapes, upper_root: u32) -> Self {
         let visible = split.placed.iter().copied().filter(|&i| scene.instances[i as usize].visible);
         let mut roots = Vec::new();
         let mut entries = Vec::new();
@@ -67,7 +67,7 @@ impl Placement {
             placement.push(Some(instance), &Affine3A::IDENTITY, codes::NONE, Some(source));
         }
         if !is_single_level {
-            placement.root = rounded_up(shape_nodes);
+            placement.root = upper_root;
             placement.nodes = rebased(kind, &tlas.nodes, placement.root, 0).collect();
             // Each level leaves at most one group behind, and entering a mesh leaves two.
             placement.stack_size = (tlas.depth + deepest + 2).next_multiple_of(4);
@@ -82,7 +82,7 @@ impl Placement {
 }
 
 /// To an eighth of its own size at most: the root is a constant of the kernels, and a shape more or less must not compile others.
-fn rounded_up(nodes: u32) -> u32 {
+pub(super) fn rounded_up(nodes: u32) -> u32 {
     nodes.next_multiple_of((nodes / 16).next_power_of_two())
 }
 

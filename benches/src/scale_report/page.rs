@@ -1,0 +1,178 @@
+//! Tables and plot of the raw numbers.
+
+use fovea_sampler::report::{Chart, Mark, Shape};
+use serde_json::Value;
+
+const SIZE_PX: [f64; 2] = [960.0, 560.0];
+/// Left, top, right, bottom edge of the axes.
+const AXES_PX: [f64; 4] = [70.0, 50.0, 740.0, 490.0];
+const SIDES: [&str; 2] = ["buffers", "textures"];
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or(f64::NAN)
+}
+
+fn list(value: &Value) -> impl Iterator<Item = &Value> {
+    value.as_array().into_iter().flatten()
+}
+
+fn median(values: &Value) -> f64 {
+    let mut all: Vec<f64> = list(values).map(number).collect();
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// Nanoseconds a ray of a set: on the device on both sides, and of obvhs on all cores.
+fn ns_per_ray(set: &Value) -> [f64; 3] {
+    let per_ray = |seconds: &Value| median(seconds) / number(&set["count"]) * 1e9;
+    [per_ray(&set["device_s"]["buffers"]), per_ray(&set["device_s"]["textures"]), per_ray(&set["obvhs_s"])]
+}
+
+/// Least squares of `y = a + b log10 n`: b, and the share of the variance that it explains.
+fn against_logarithm(points: &[[f64; 2]]) -> (f64, f64) {
+    let count = points.len() as f64;
+    let usable = points.iter().map(|[n, y]| [n.log10(), *y]);
+    let [mean_x, mean_y] = [0, 1].map(|i| usable.clone().map(|p| p[i]).sum::<f64>() / count);
+    let [xx, xy, yy] = usable.fold([0.0; 3], |[xx, xy, yy], [x, y]| {
+        let (x, y) = (x - mean_x, y - mean_y);
+        [xx + x * x, xy + x * y, yy + y * y]
+    });
+    (xy / xx, xy * xy / (xx * yy))
+}
+
+/// A column of the table of rays, as values over the number of triangles; where there is no number the point is left out.
+fn series(raw: &Value, rays: &str, value: impl Fn(&Value) -> f64) -> Vec<[f64; 2]> {
+    list(&raw["triangles"])
+        .filter_map(|row| {
+            let set = list(&row["sets"]).find(|set| set["rays"] == rays)?;
+            let y = value(set);
+            y.is_finite().then(|| [number(&row["triangles"]), y])
+        })
+        .collect()
+}
+
+fn cell(value: f64, digits: usize) -> String {
+    if value.is_finite() { format!("{value:.digits$}") } else { "-".into() }
+}
+
+/// The page.
+pub fn text(raw: &Value) -> String {
+    let mut text = String::from("# Scale: cost against the number of triangles and of instances\n\n");
+    for (name, value) in raw["machine"].as_object().into_iter().flatten() {
+        text += &format!("- {name}: {}\n", value.as_str().unwrap_or(""));
+    }
+    text += &format!(
+        "- largest storage binding: {} MiB; rounds: {}, medians\n\n![Time of a ray against the number of triangles](scale.svg)\n\n",
+        number(&raw["largest_binding_bytes"]) / 1_048_576.0,
+        number(&raw["rounds"])
+    );
+    text += include_str!("page.md");
+    text += "\n## Triangles\n\n| triangles | rays | steps a ray | ns a ray, buffers | textures | obvhs, all cores | obvhs / device |\n|---|---|---|---|---|---|---|\n";
+    for row in list(&raw["triangles"]) {
+        for set in list(&row["sets"]) {
+            let [buffers, textures, obvhs] = ns_per_ray(set);
+            // As a scene of this size is traced.
+            let device = if buffers.is_finite() { buffers } else { textures };
+            text += &format!(
+                "| {} | {} | {:.1} | {} | {} | {:.0} | {:.2} |\n",
+                row["triangles"],
+                set["rays"].as_str().unwrap_or(""),
+                number(&set["steps_per_ray"]),
+                cell(buffers, 0),
+                cell(textures, 0),
+                obvhs,
+                obvhs / device
+            );
+        }
+    }
+    text += "\nGrowth with each factor of ten, and the share of the variance that a straight line over the logarithm explains:\n\n| rays | steps | device, textures | obvhs |\n|---|---|---|---|\n";
+    for rays in ["primary", "diffuse"] {
+        let steps = against_logarithm(&series(raw, rays, |set| number(&set["steps_per_ray"])));
+        let device = against_logarithm(&series(raw, rays, |set| ns_per_ray(set)[1]));
+        let obvhs = against_logarithm(&series(raw, rays, |set| ns_per_ray(set)[2]));
+        text += &format!(
+            "| {rays} | {:+.1}, {:.2} | {:+.0} ns, {:.2} | {:+.0} ns, {:.2} |\n",
+            steps.0, steps.1, device.0, device.1, obvhs.0, obvhs.1
+        );
+    }
+    text += "\n| triangles | file, MB | import, s | hierarchy alone (obvhs), s | hierarchy and tables, s | device bytes a triangle, buffers | textures |\n|---|---|---|---|---|---|---|\n";
+    for row in list(&raw["triangles"]) {
+        let triangles = number(&row["triangles"]);
+        let bytes = SIDES.map(|side| cell(number(&row["uploads"][side]["device_bytes"]) / triangles, 1));
+        text += &format!(
+            "| {} | {:.1} | {:.3} | {:.3} | {:.3} | {} | {} |\n",
+            row["triangles"],
+            number(&row["file_bytes"]) * 1e-6,
+            number(&row["import_s"]),
+            number(&row["obvhs_build_s"]),
+            number(&row["uploads"]["textures"]["bvh_and_tables_s"]),
+            bytes[0],
+            bytes[1]
+        );
+    }
+    text += "\n## Instances of one mesh\n\n| instances | file, MB | import, s | scene to device without kernels, s | MB on the device | primary, ns a ray | steps a ray | move one, s |\n|---|---|---|---|---|---|---|---|\n";
+    for row in list(&raw["instances"]) {
+        let primary = &row["primary"];
+        text += &format!(
+            "| {} | {:.1} | {:.3} | {:.3} | {:.1} | {:.0} | {:.1} | {:.3} |\n",
+            row["instances"],
+            number(&row["file_bytes"]) * 1e-6,
+            number(&row["import_s"]),
+            number(&row["set_scene_s"]) - number(&row["kernels_s"]),
+            number(&row["device_bytes"]) * 1e-6,
+            median(&primary["device_s"]) / number(&primary["count"]) * 1e9,
+            number(&primary["steps_per_ray"]),
+            median(&row["move_one_s"])
+        );
+    }
+    text
+}
+
+/// Nanoseconds a ray over the logarithm of the number of triangles: what grows with the logarithm is a straight line.
+pub fn plot(raw: &Value) -> Chart {
+    let names = ["device, buffers", "device, textures", "obvhs, all cores"];
+    let mut curves = Vec::new();
+    for rays in ["primary", "diffuse"] {
+        for (side, name) in names.iter().enumerate() {
+            curves.push((format!("{rays}: {name}"), series(raw, rays, |set| ns_per_ray(set)[side])));
+        }
+    }
+    let points = || curves.iter().flat_map(|(_, points)| points);
+    let decades = points().fold([f64::MAX, f64::MIN], |[low, high], p| [low.min(p[0].log10()), high.max(p[0].log10())]);
+    let decades = [decades[0].floor(), (decades[1] - 0.05).ceil()];
+    let step = points().fold(0.0, |most: f64, p| most.max(p[1])) / 5.0;
+    let step = [50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0].into_iter().find(|round| *round >= step).unwrap_or(5000.0);
+    let [left, top, right, bottom] = AXES_PX;
+    let at = |[n, y]: [f64; 2]| {
+        let x = (n.log10() - decades[0]) / (decades[1] - decades[0]).max(1.0);
+        [left + x * (right - left), bottom - y / (6.0 * step) * (bottom - top)]
+    };
+    let mut shapes = Vec::new();
+    let write = |shapes: &mut Vec<Shape>, at, text: String, centred, mark| {
+        shapes.push(Shape::Text { at, text, centred, mark });
+    };
+    for decade in decades[0] as i32..=decades[1] as i32 {
+        let [x, _] = at([10f64.powi(decade), 0.0]);
+        shapes.push(Shape::Line { from: [x, top], to: [x, bottom], mark: Mark::Grid });
+        write(&mut shapes, [x, bottom + 20.0], format!("1e{decade}"), true, Mark::Ink);
+    }
+    for line in 0..=6 {
+        let value = f64::from(line) * step;
+        let [_, y] = at([1.0, value]);
+        shapes.push(Shape::Line { from: [left, y], to: [right, y], mark: Mark::Grid });
+        write(&mut shapes, [left - 28.0, y + 4.0], format!("{value:.0}"), true, Mark::Ink);
+    }
+    shapes.push(Shape::Line { from: [left, bottom], to: [right, bottom], mark: Mark::Ink });
+    shapes.push(Shape::Line { from: [left, top], to: [left, bottom], mark: Mark::Ink });
+    for (number, (name, points)) in curves.iter().enumerate() {
+        let mark = Mark::Series(number as u8);
+        for pair in points.windows(2) {
+            shapes.push(Shape::Line { from: at(pair[0]), to: at(pair[1]), mark });
+        }
+        shapes.extend(points.iter().map(|&point| Shape::Point { at: at(point), filled: true, mark }));
+        write(&mut shapes, [right + 14.0, top + 12.0 + 20.0 * number as f64], name.clone(), false, mark);
+    }
+    write(&mut shapes, [0.5 * (left + right), 24.0], "Time of a ray, ns".into(), true, Mark::Ink);
+    write(&mut shapes, [0.5 * (left + right), bottom + 44.0], "triangles".into(), true, Mark::Ink);
+    Chart { size_px: SIZE_PX, shapes }
+}
