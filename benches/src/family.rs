@@ -32,7 +32,8 @@ pub fn write_cave(path: &Path, triangles: u32) -> io::Result<u32> {
         direction * (RADIUS * (1.0 + bumps(direction)))
     });
     let count = shape.indices.len() as u32 / 3;
-    write(path, &shape, vec![json!({ "name": "cave", "mesh": 0 })])?;
+    let lamp = Lamp { position: [3.0, 4.0, 2.0], candelas: 60.0 };
+    write(path, &shape, vec![json!({ "name": "cave", "mesh": 0 })], &lamp)?;
     Ok(count)
 }
 
@@ -50,7 +51,7 @@ pub fn write_balls(path: &Path, instances: u32) -> io::Result<()> {
         let turn = (i % 8) as f32 / 8.0 * std::f32::consts::TAU * 0.5;
         json!({ "name": format!("ball {i}"), "mesh": 0, "translation": place, "rotation": [0.0, turn.sin(), 0.0, turn.cos()] })
     }).collect();
-    write(path, &shape, nodes)
+    write(path, &shape, nodes, &Lamp { position: [0.3, 0.5, 0.2], candelas: 2.0 })
 }
 
 /// Height above the sphere over its radius.
@@ -100,10 +101,19 @@ fn closed_grid(n: u32, surface: impl Fn(Vec3) -> Vec3 + Sync) -> Shape {
     Shape { positions, normals, indices }
 }
 
-/// Adds a camera and a lamp in the middle.
-fn write(path: &Path, shape: &Shape, mut nodes: Vec<Value>) -> io::Result<()> {
+/// A point that shines.
+struct Lamp {
+    /// Metres.
+    position: [f32; 3],
+    candelas: f32,
+}
+
+/// Adds a camera in the middle, and the lamp.
+fn write(path: &Path, shape: &Shape, mut nodes: Vec<Value>, lamp: &Lamp) -> io::Result<()> {
     nodes.push(json!({ "name": "middle", "camera": 0 }));
-    nodes.push(json!({ "name": "lamp", "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
+    nodes.push(json!({
+        "name": "lamp", "translation": lamp.position, "extensions": { "KHR_lights_punctual": { "light": 0 } },
+    }));
     let (vertices, indices) = (shape.positions.len(), shape.indices.len());
     let (low, high) = shape.positions.iter().fold((Vec3::MAX, Vec3::MIN), |(l, h), &p| (l.min(p), h.max(p)));
     let parts: [&[u8]; 3] = [
@@ -120,7 +130,7 @@ fn write(path: &Path, shape: &Shape, mut nodes: Vec<Value>) -> io::Result<()> {
     let document = json!({
         "asset": { "version": "2.0", "generator": "fovea-benches" },
         "extensionsUsed": ["KHR_lights_punctual"],
-        "extensions": { "KHR_lights_punctual": { "lights": [{ "type": "point", "intensity": 400.0 }] } },
+        "extensions": { "KHR_lights_punctual": { "lights": [{ "type": "point", "intensity": lamp.candelas }] } },
         "buffers": [{ "byteLength": total }],
         "bufferViews": [view(0), view(1), view(2)],
         "accessors": [

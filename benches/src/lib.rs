@@ -10,7 +10,6 @@ use tracer::{
     scene::{Backdrop, ContentHash, Environment, Instance, Material, Mesh, Scene},
 };
 
-pub mod baseline;
 pub mod family;
 
 /// A scene of one far triangle under a constant sky: almost nothing but ray generation.

@@ -2,10 +2,10 @@
 //! 10^3 to 10^5 instances.
 //!
 //! Writes the scenes to SCENES_DIR as `.glb` files, where they stay. Triangles: a closed cave, the same surface in more or fewer
-//! triangles, so that every ray hits. 2^20 primary rays from its middle and as many cosine-distributed rays from what they hit,
-//! by the kernels' traversal and by obvhs on the CPU in turn, the median of five rounds; with the geometry in storage buffers
-//! where it fits one binding, and in texture pages. Instances: one ball in many places. Writes `scale.json` (raw numbers),
-//! `scale.md` (the tables) and `scale.svg` (the plot).
+//! triangles, so that every ray hits. 2^18 primary rays of the mode OD from its middle, as the device makes them, and as many
+//! cosine-distributed rays from what they hit, by the kernels' traversal and by obvhs on the CPU in turn, the median of five
+//! rounds; with the geometry in storage buffers where it fits one binding, and in texture pages. Instances: one ball in many
+//! places. Writes `scale.json` (raw numbers), `scale.md` (the tables) and `scale.svg` (the plot).
 
 use std::{
     path::{Path, PathBuf},
@@ -14,9 +14,9 @@ use std::{
     time::Instant,
 };
 
+use fovea_app::commands::bench::baseline::{Baseline, secondary_rays};
 use fovea_benches::{
     AnyError,
-    baseline::{Baseline, primary_rays, secondary_rays},
     family::{write_balls, write_cave},
     report_main,
 };
@@ -36,6 +36,9 @@ use tracer::{
 mod page;
 
 const ROUNDS: usize = 5;
+const RAYS: u32 = 1 << 18;
+/// The panorama whose primary rays are taken.
+const FILM: FilmOptions = FilmOptions::equirect(1024, 512);
 const TRIANGLES: [u32; 5] = [10_000, 100_000, 1_000_000, 3_162_278, 10_000_000];
 const INSTANCES: [u32; 3] = [1_000, 10_000, 100_000];
 
@@ -90,7 +93,7 @@ fn import(file: &Path) -> Result<(Scene, f64), AnyError> {
 fn renderer(gpu: &Gpu) -> Result<Renderer, AnyError> {
     let distribution = RadialDistribution::new(Reddy2001, Geometry::Sphere, Angle::from_degrees(80.0), 0.002)?;
     let everywhere = Distribution::omnidirectional(Arc::new(Inverse::default_for(&distribution)));
-    let options = RendererOptions { film: FilmOptions::equirect(64, 32), ..Default::default() };
+    let options = RendererOptions { film: FILM, ..Default::default() };
     Ok(Renderer::new(gpu, &options, everywhere)?)
 }
 
@@ -106,7 +109,8 @@ fn triangles(gpu: &Gpu, file: &Path) -> Result<Value, AnyError> {
             Err(error) => return Err(error.into()),
         }
     }
-    let primary = primary_rays(Vec3::ZERO);
+    let (_, last, _) = sides.last_mut().ok_or("no side")?;
+    let primary = last.primary_rays(RAYS)?;
     let [diffuse, _] = secondary_rays(&scene, &baseline, &primary);
     let mut sets = Vec::new();
     for (rays_name, rays) in [("primary", &primary), ("diffuse", &diffuse)] {
@@ -119,7 +123,7 @@ fn triangles(gpu: &Gpu, file: &Path) -> Result<Value, AnyError> {
                 seconds.push(secs);
                 steps = mean_steps;
             }
-            cpu.push(rays.len() as f64 / baseline.time(rays));
+            cpu.push(baseline.time(rays));
         }
         let device: serde_json::Map<_, _> =
             sides.iter().zip(device).map(|((name, ..), seconds)| ((*name).into(), seconds.into())).collect();
@@ -157,7 +161,7 @@ fn instances(gpu: &Gpu, file: &Path) -> Result<Value, AnyError> {
     let started = Instant::now();
     let report = renderer.set_scene(&scene)?;
     let set_secs = started.elapsed().as_secs_f64();
-    let primary = primary_rays(Vec3::ZERO);
+    let primary = renderer.primary_rays(RAYS)?;
     let mut device = Vec::new();
     let mut steps = 0.0;
     for _ in 0..ROUNDS {

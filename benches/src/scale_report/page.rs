@@ -1,11 +1,12 @@
 //! Tables and plot of the raw numbers.
 
-use fovea_sampler::report::{Chart, Mark, Shape};
+use fovea_app::commands::study::{
+    plot::{Axis, Scale, Series, lines},
+    statistics,
+};
+use fovea_sampler::report::{Chart, Mark};
 use serde_json::Value;
 
-const SIZE_PX: [f64; 2] = [960.0, 560.0];
-/// Left, top, right, bottom edge of the axes.
-const AXES_PX: [f64; 4] = [70.0, 50.0, 740.0, 490.0];
 const SIDES: [&str; 2] = ["buffers", "textures"];
 
 fn number(value: &Value) -> f64 {
@@ -17,9 +18,7 @@ fn list(value: &Value) -> impl Iterator<Item = &Value> {
 }
 
 fn median(values: &Value) -> f64 {
-    let mut all: Vec<f64> = list(values).map(number).collect();
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2).copied().unwrap_or(f64::NAN)
+    statistics::median(list(values).map(number).collect()).unwrap_or(f64::NAN)
 }
 
 /// Nanoseconds a ray of a set: on the device on both sides, and of obvhs on all cores.
@@ -130,49 +129,16 @@ pub fn text(raw: &Value) -> String {
 
 /// Nanoseconds a ray over the logarithm of the number of triangles: what grows with the logarithm is a straight line.
 pub fn plot(raw: &Value) -> Chart {
-    let names = ["device, buffers", "device, textures", "obvhs, all cores"];
     let mut curves = Vec::new();
     for rays in ["primary", "diffuse"] {
-        for (side, name) in names.iter().enumerate() {
-            curves.push((format!("{rays}: {name}"), series(raw, rays, |set| ns_per_ray(set)[side])));
+        for (side, name) in ["buffers", "textures", "obvhs"].into_iter().enumerate() {
+            let points = series(raw, rays, |set| ns_per_ray(set)[side]);
+            curves.push(Series { name: format!("{rays}, {name}"), mark: Mark::Series(curves.len() as u8), points });
         }
     }
-    let points = || curves.iter().flat_map(|(_, points)| points);
-    let decades = points().fold([f64::MAX, f64::MIN], |[low, high], p| [low.min(p[0].log10()), high.max(p[0].log10())]);
-    let decades = [decades[0].floor(), (decades[1] - 0.05).ceil()];
-    let step = points().fold(0.0, |most: f64, p| most.max(p[1])) / 5.0;
-    let step = [50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0].into_iter().find(|round| *round >= step).unwrap_or(5000.0);
-    let [left, top, right, bottom] = AXES_PX;
-    let at = |[n, y]: [f64; 2]| {
-        let x = (n.log10() - decades[0]) / (decades[1] - decades[0]).max(1.0);
-        [left + x * (right - left), bottom - y / (6.0 * step) * (bottom - top)]
-    };
-    let mut shapes = Vec::new();
-    let write = |shapes: &mut Vec<Shape>, at, text: String, centred, mark| {
-        shapes.push(Shape::Text { at, text, centred, mark });
-    };
-    for decade in decades[0] as i32..=decades[1] as i32 {
-        let [x, _] = at([10f64.powi(decade), 0.0]);
-        shapes.push(Shape::Line { from: [x, top], to: [x, bottom], mark: Mark::Grid });
-        write(&mut shapes, [x, bottom + 20.0], format!("1e{decade}"), true, Mark::Ink);
-    }
-    for line in 0..=6 {
-        let value = f64::from(line) * step;
-        let [_, y] = at([1.0, value]);
-        shapes.push(Shape::Line { from: [left, y], to: [right, y], mark: Mark::Grid });
-        write(&mut shapes, [left - 28.0, y + 4.0], format!("{value:.0}"), true, Mark::Ink);
-    }
-    shapes.push(Shape::Line { from: [left, bottom], to: [right, bottom], mark: Mark::Ink });
-    shapes.push(Shape::Line { from: [left, top], to: [left, bottom], mark: Mark::Ink });
-    for (number, (name, points)) in curves.iter().enumerate() {
-        let mark = Mark::Series(number as u8);
-        for pair in points.windows(2) {
-            shapes.push(Shape::Line { from: at(pair[0]), to: at(pair[1]), mark });
-        }
-        shapes.extend(points.iter().map(|&point| Shape::Point { at: at(point), filled: true, mark }));
-        write(&mut shapes, [right + 14.0, top + 12.0 + 20.0 * number as f64], name.clone(), false, mark);
-    }
-    write(&mut shapes, [0.5 * (left + right), 24.0], "Time of a ray, ns".into(), true, Mark::Ink);
-    write(&mut shapes, [0.5 * (left + right), bottom + 44.0], "triangles".into(), true, Mark::Ink);
-    Chart { size_px: SIZE_PX, shapes }
+    let field = |name: &str| raw["machine"][name].as_str().unwrap_or("unknown");
+    let caption = format!("{} / {} / {}", field("machine"), field("adapter"), field("commit"));
+    let across = Axis { title: "triangles", scale: Scale::Logarithmic };
+    let up = Axis { title: "ns a ray, all cores", scale: Scale::Linear };
+    lines("Time of a ray", &caption, across, up, &curves)
 }

@@ -19,7 +19,7 @@ use crate::output::{check_writable, write_atomically};
 use crate::process;
 use subject::Subject;
 
-mod baseline;
+pub mod baseline;
 mod edits;
 mod features;
 mod goals;

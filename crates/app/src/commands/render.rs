@@ -75,9 +75,10 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     renderer.set_pose(pose);
     renderer.set_first_sample(args.first_sample);
     renderer.set_adaptive(args.sampling.adaptive);
-    if let (Some(file), Some(path)) = (&resumed, &args.resume) {
-        resume::restore(&mut renderer, file, path)?;
-    }
+    let earlier = match resumed.zip(args.resume.as_ref()) {
+        Some((file, path)) => Some(resume::restore(&mut renderer, file, path)?),
+        None => None,
+    };
     let before = renderer.statistics()?;
     if let Some(folder) = &args.dump_kernels {
         dump_kernels(&renderer, folder)?;
@@ -96,8 +97,8 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     match format {
         ImageFormat::Exr => {
             let film = renderer.snapshot()?;
-            let file = match resumed {
-                Some(before) => before.gone_on(film, &settings),
+            let file = match earlier {
+                Some(earlier) => FilmFile::gone_on(earlier, film, &settings),
                 None => FilmFile::new(film, settings.clone()),
             };
             exr::write(&args.output, &file)?;

@@ -23,11 +23,11 @@ pub mod flip;
 mod observer;
 mod picture;
 pub(super) mod plan;
-pub(super) mod plot;
+pub mod plot;
 mod rates;
 mod record;
 mod report;
-pub(super) mod statistics;
+pub mod statistics;
 mod tables;
 
 /// Carries out a study, or goes on with one.

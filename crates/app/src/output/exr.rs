@@ -12,6 +12,11 @@
 
 use std::path::Path;
 
+use ::exr::block::lines::LineRefMut;
+use ::exr::image::write::samples::{SamplesWriter, WritableSamples};
+use ::exr::math::RoundingMode;
+use ::exr::meta::attribute::LevelMode;
+use ::exr::meta::header::Header;
 use ::exr::prelude::*;
 use serde_json::{Map, Value};
 use tracer::film::{FilmSnapshot, MergeError};
@@ -52,10 +57,9 @@ impl FilmFile {
         Self { film, settings }
     }
 
-    /// This film after more samples, which were placed by these settings.
-    #[must_use]
-    pub fn gone_on(self, film: FilmSnapshot, settings: &Map<String, Value>) -> Self {
-        Self::new(film, header::combined(self.settings, settings))
+    /// A film that went on from a file with the settings `before`; the samples since were placed by `settings`.
+    pub fn gone_on(before: Map<String, Value>, film: FilmSnapshot, settings: &Map<String, Value>) -> Self {
+        Self::new(film, header::combined(before, settings))
     }
 
     /// Adds the samples of another film of the same picture.
@@ -75,20 +79,10 @@ pub fn write(path: &Path, file: &FilmFile) -> std::result::Result<(), OutputErro
     let FilmFile { film, settings } = file;
     let size = (film.header.options.width as usize, film.header.options.height as usize);
     film.check().map_err(|error| OutputError::Unwritable { path: path.to_owned(), reason: error.to_string() })?;
-    // One after the other, since the largest films fill half of the memory as they are.
-    let mut floats = ["R", "G", "B", "variance"].map(|name| (name, Vec::with_capacity(size.0 * size.1)));
-    for pixel in film.pixels() {
-        let [red, green, blue] = pixel.mean;
-        for ((_, values), value) in floats.iter_mut().zip([red, green, blue, pixel.variance_of_mean]) {
-            values.push(value as f32);
-        }
-    }
-    let words = WORDS.iter().enumerate().map(|(word, name)| {
-        let values = film.words.iter().skip(word).step_by(WORDS.len()).copied();
-        AnyChannel::new(*name, FlatSamples::U32(values.collect()))
-    });
-    let floats = floats.into_iter().map(|(name, values)| AnyChannel::new(name, FlatSamples::F32(values)));
-    let channels = AnyChannels::sort(floats.chain(words).collect());
+    let floats = [("R", Part::Mean(0)), ("G", Part::Mean(1)), ("B", Part::Mean(2)), ("variance", Part::Variance)];
+    let words = WORDS.iter().enumerate().map(|(word, name)| (*name, Part::Word(word)));
+    let channel = |(name, part)| AnyChannel::new(name, ChannelOfFilm { film, part });
+    let channels = AnyChannels::sort(floats.into_iter().chain(words).map(channel).collect());
     let mut attributes = LayerAttributes {
         software_name: Text::new_or_none(concat!("fovea ", env!("CARGO_PKG_VERSION"))),
         ..LayerAttributes::default()
@@ -99,6 +93,55 @@ pub fn write(path: &Path, file: &FilmFile) -> std::result::Result<(), OutputErro
     let encoding = Encoding { compression: Compression::ZIP16, ..Encoding::FAST_LOSSLESS };
     let image = Image::from_layer(Layer::new(size, attributes, encoding, channels));
     write_atomically(path, |writer| image.write().to_buffered(writer).map_err(|error| error.to_string()))
+}
+
+/// What a channel holds of a pixel.
+#[derive(Clone, Copy, Debug)]
+enum Part {
+    /// A component of the mean radiance.
+    Mean(usize),
+    /// Variance of the mean's luminance.
+    Variance,
+    /// One of the film's words.
+    Word(usize),
+}
+
+/// A channel that is made of the film line by line as it is written: all channels at once would be larger than the film, and the
+/// largest films fill much of the memory as they are.
+#[derive(Clone, Copy, Debug)]
+struct ChannelOfFilm<'film> {
+    film: &'film FilmSnapshot,
+    part: Part,
+}
+
+impl WritableSamples<'_> for ChannelOfFilm<'_> {
+    type Writer = Self;
+
+    fn sample_type(&self) -> SampleType {
+        if matches!(self.part, Part::Word(_)) { SampleType::U32 } else { SampleType::F32 }
+    }
+
+    fn infer_level_modes(&self) -> (LevelMode, RoundingMode) {
+        (LevelMode::Singular, RoundingMode::Down)
+    }
+
+    fn create_samples_writer(&self, _header: &Header) -> Self {
+        *self
+    }
+}
+
+impl SamplesWriter for ChannelOfFilm<'_> {
+    fn extract_line(&self, line: LineRefMut<'_>) {
+        let film = self.film;
+        let position = line.location.position;
+        let first = position.y() * film.header.options.width as usize + position.x();
+        let written = match self.part {
+            Part::Mean(component) => line.write_samples(|i| film.pixel(first + i).mean[component] as f32),
+            Part::Variance => line.write_samples(|i| film.pixel(first + i).variance_of_mean as f32),
+            Part::Word(word) => line.write_samples(|i| film.words[(first + i) * WORDS.len() + word]),
+        };
+        written.expect("a line has room for its samples");
+    }
 }
 
 /// Whether a file says that it is a film, by its header.

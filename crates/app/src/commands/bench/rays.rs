@@ -7,16 +7,14 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use fovea_sampler::sequence::hash;
-use glam::Vec3;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use tracer::bvh::HierarchyKind;
 use tracer::gpu::Gpu;
-use tracer::renderer::{Query, RayKind, Renderer};
-use tracer::scene::{AlphaMode, Scene};
+use tracer::renderer::{Query, Renderer};
+use tracer::scene::AlphaMode;
 
-use super::baseline::Baseline;
+use super::baseline::{Baseline, secondary_rays};
 use super::subject::Subject;
 use super::{direction_json, finite};
 use crate::cli::bench::BenchArgs;
@@ -111,37 +109,4 @@ fn time(
         "device_s": device_s, "other_s": other_s, "obvhs_s": cpu_s,
         "device_process_cpu_s": finite(cpu_time[0]), "obvhs_process_cpu_s": finite(cpu_time[1]),
     }))
-}
-
-/// A number in 0..1 by index and dimension.
-fn random(index: u32, dimension: u32) -> f32 {
-    (hash(index.wrapping_mul(8).wrapping_add(dimension)) >> 8) as f32 / 16_777_216.0
-}
-
-/// From what the primary rays hit: cosine-distributed directions, and segments to random points of the scene's bounds.
-fn secondary_rays(scene: &Scene, baseline: &Baseline, primary: &[Query]) -> [Vec<Query>; 2] {
-    let (low, high) = scene.bounds().unwrap_or((Vec3::ZERO, Vec3::ONE));
-    let origins: Vec<(u32, Vec3, Vec3)> = primary
-        .par_iter()
-        .enumerate()
-        .filter_map(|(i, ray)| {
-            let (t, normal) = baseline.closest(ray)?;
-            let normal = Vec3::from(normal).try_normalize()?;
-            let normal = if normal.dot(ray.direction) > 0.0 { -normal } else { normal };
-            let origin = ray.origin + ray.direction * t;
-            Some((i as u32, origin + normal * (1e-4 * (1.0 + origin.abs().max_element())), normal))
-        })
-        .collect();
-    let diffuse = origins.iter().map(|&(i, origin, normal)| {
-        let z = 1.0 - 2.0 * random(i, 0);
-        let (sin, cos) = (random(i, 1) * std::f32::consts::TAU).sin_cos();
-        let r = (1.0 - z * z).max(0.0).sqrt();
-        let direction = (normal + Vec3::new(r * cos, r * sin, z)).try_normalize().unwrap_or(normal);
-        Query { origin, direction, t_max: f32::MAX, kind: RayKind::Closest }
-    });
-    let shadow = origins.iter().map(|&(i, origin, _)| {
-        let end = low + (high - low) * Vec3::new(random(i, 2), random(i, 3), random(i, 4));
-        Query { origin, direction: end - origin, t_max: 1.0, kind: RayKind::Any }
-    });
-    [diffuse.collect(), shadow.collect()]
 }

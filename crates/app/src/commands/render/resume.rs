@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use glam::Quat;
+use serde_json::{Map, Value};
 use tracer::film::FilmHeader;
 use tracer::renderer::{FilmPose, Renderer, RendererOptions, SequenceKind};
 
@@ -50,11 +51,13 @@ pub fn take_over(
     Ok((options, film.pose))
 }
 
-/// Puts the film into a renderer that has its scene and pose.
+/// Puts the film into a renderer that has its scene and pose; what is left are its settings. The largest films are too large to
+/// be kept beside the renderer's.
 ///
 /// # Errors
 /// When the film is of another scene.
-pub fn restore(renderer: &mut Renderer, file: &FilmFile, path: &Path) -> anyhow::Result<()> {
+pub fn restore(renderer: &mut Renderer, file: FilmFile, path: &Path) -> anyhow::Result<Map<String, Value>> {
     let name = file.settings.get("scene").and_then(|name| name.as_str()).unwrap_or("another scene");
-    renderer.restore(&file.film).with_context(|| format!("{} was made of {name}", path.display()))
+    renderer.restore(&file.film).with_context(|| format!("{} was made of {name}", path.display()))?;
+    Ok(file.settings)
 }
