@@ -131,14 +131,13 @@ pub fn text(raw: &Value) -> String {
 pub fn plot(raw: &Value) -> Chart {
     let mut curves = Vec::new();
     for rays in ["primary", "diffuse"] {
-        for (side, name) in ["buffers", "textures", "obvhs"].into_iter().enumerate() {
+        for (side, name) in ["buffer", "texture", "obvhs"].into_iter().enumerate() {
             let points = series(raw, rays, |set| ns_per_ray(set)[side]);
-            curves.push(Series { name: format!("{rays}, {name}"), mark: Mark::Series(curves.len() as u8), points });
+            curves.push(Series { name: format!("{rays} {name}"), mark: Mark::Series(curves.len() as u8), points });
         }
     }
-    let field = |name: &str| raw["machine"][name].as_str().unwrap_or("unknown");
-    let caption = format!("{} / {} / {}", field("machine"), field("adapter"), field("commit"));
+    let adapter = raw["machine"]["adapter"].as_str().unwrap_or("unknown");
     let across = Axis { title: "triangles", scale: Scale::Logarithmic };
     let up = Axis { title: "ns a ray, all cores", scale: Scale::Linear };
-    lines("Time of a ray", &caption, across, up, &curves)
+    lines("Time of a ray", adapter, across, up, &curves)
 }
