@@ -29,6 +29,7 @@ mod vertices;
 
 pub(crate) use vertices::decode_octahedral;
 
+pub use albedo::lobe_albedos;
 pub use alias::AliasTable;
 pub use cache::SceneCache;
 use pages::Pages;
