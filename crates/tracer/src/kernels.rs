@@ -87,6 +87,7 @@ const MODULES: &[(&str, &str)] = &[
     ("view::footprint", include_str!("../../../shaders/view/footprint.wesl")),
     ("view::error", include_str!("../../../shaders/view/error.wesl")),
     ("view::first_hit", include_str!("../../../shaders/view/first_hit.wesl")),
+    ("view::sketch", include_str!("../../../shaders/view/sketch.wesl")),
     ("view::histogram", include_str!("../../../shaders/view/histogram.wesl")),
     ("view::colors", include_str!("../../../shaders/view/colors.wesl")),
     ("view::ring", include_str!("../../../shaders/view/ring.wesl")),
@@ -139,6 +140,8 @@ pub enum Kernel {
     Error,
     /// What the pixels of the view show first.
     FirstHit,
+    /// What the pixels of a view show first, without materials.
+    Sketch,
     /// Pixels of the view by luminance.
     Histogram,
     /// Film to the finest level of the panorama.
@@ -153,7 +156,7 @@ pub enum Kernel {
 
 impl Kernel {
     /// Every kernel.
-    pub const ALL: [Self; 23] = [
+    pub const ALL: [Self; 24] = [
         Self::Trace,
         Self::Generate,
         Self::Noise,
@@ -172,6 +175,7 @@ impl Kernel {
         Self::Inspect,
         Self::Error,
         Self::FirstHit,
+        Self::Sketch,
         Self::Histogram,
         Self::PanoramaResolve,
         Self::PanoramaPull,
@@ -200,6 +204,7 @@ impl Kernel {
             Self::Inspect => "view::inspect",
             Self::Error => "view::error",
             Self::FirstHit => "view::first_hit",
+            Self::Sketch => "view::sketch",
             Self::Histogram => "view::histogram",
             Self::PanoramaResolve => "vr::resolve",
             Self::PanoramaPull => "vr::pull",
@@ -212,13 +217,19 @@ impl Kernel {
     pub const fn draws(self) -> bool {
         matches!(
             self,
-            Self::Present | Self::Inspect | Self::PanoramaResolve | Self::PanoramaPull | Self::PanoramaPush | Self::Eye
+            Self::Present
+                | Self::Inspect
+                | Self::Sketch
+                | Self::PanoramaResolve
+                | Self::PanoramaPull
+                | Self::PanoramaPush
+                | Self::Eye
         )
     }
 
     /// Whether the scene's features are flags of this kernel.
     pub const fn reads_scene(self) -> bool {
-        matches!(self, Self::Trace | Self::Generate | Self::Query | Self::FirstHit)
+        matches!(self, Self::Trace | Self::Generate | Self::Query | Self::FirstHit | Self::Sketch)
     }
 
     /// Name of the entry point (the fragment entry where the kernel draws).
@@ -242,6 +253,7 @@ impl Kernel {
             Self::Inspect => "inspect",
             Self::Error => "error",
             Self::FirstHit => "trace_first_hits",
+            Self::Sketch => "sketch",
             Self::Histogram => "histogram",
             Self::PanoramaResolve => "resolve",
             Self::PanoramaPull => "pull",

@@ -14,6 +14,7 @@ mod options;
 mod panorama;
 mod query;
 mod restore;
+mod sketch;
 mod split;
 mod timing;
 

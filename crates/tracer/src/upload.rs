@@ -7,7 +7,6 @@ use thiserror::Error;
 use wgpu::util::DeviceExt;
 
 use crate::{
-    bvh::HierarchyKind,
     features::{Feature, SceneFeatures},
     gpu::{Gpu, free_text},
     kernels::KernelConstants,
@@ -22,7 +21,9 @@ mod geometry;
 mod lights;
 mod materials;
 mod pages;
+mod placed;
 mod placement;
+mod sketch;
 mod tables;
 mod texels;
 mod vertices;
@@ -33,7 +34,8 @@ pub use albedo::lobe_albedos;
 pub use alias::AliasTable;
 pub use cache::SceneCache;
 use pages::Pages;
-use placement::Placement;
+use placed::Placed;
+pub(crate) use sketch::SketchOnGpu;
 use tables::Tables;
 
 /// Why a scene cannot go to the device.
@@ -229,22 +231,18 @@ impl SceneOnGpu {
         let started = Instant::now();
         let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let mut uploader = Uploader { gpu, device_bytes: 0, uploaded_bytes: 0 };
-        let split = cache.split(scene);
-        let shapes = cache.shapes(scene, &split, &mut uploader)?;
+        let mut placed = Placed::upload(scene, cache, &mut uploader)?;
         let shapes_secs = started.elapsed().as_secs_f64();
-        let upper_root = shapes.tables.upper_root(shapes.node_count);
-        let mut placement = Placement::of(scene, &split, cache.hierarchy(), &shapes.shapes, upper_root);
-        let light_table = lights::LightTable::build(scene, &shapes.shapes, &mut placement);
+        let light_table = lights::LightTable::build(scene, &placed.shapes.shapes, &mut placed.placement);
         let texels = cache.texels(scene, &mut uploader)?;
         let (materials, slots) = materials::encode(scene, &texels.offsets);
         let environment = cache.environment(&scene.environment, &mut uploader)?;
         let features = SceneFeatures::of(scene);
         let lobe_tables = cache.lobe_tables(features, &mut uploader);
-        let tables = if placement.nodes.is_empty() {
-            shapes.tables.clone()
-        } else {
-            shapes.tables.with_upper_level(shapes.node_count, placement.root, &placement.nodes, &mut uploader)?
-        };
+        let constants = placed.constants(environment.cells_size);
+        let features = features.with(Feature::Lights, !light_table.lights.is_empty());
+        let features = features.union(placed.features(cache.hierarchy()));
+        let Placed { shapes, placement, tables } = placed;
         let geometry_bytes = tables.bytes();
         let ([nodes, positions, triangles, vertices], geometry) = match tables {
             Tables::Buffers(buffers) => (buffers, None),
@@ -277,16 +275,8 @@ impl SceneOnGpu {
             }
         };
         Ok(Self {
-            features: features
-                .with(Feature::Lights, light_count > 0)
-                .with(Feature::Instances, !placement.is_single_level)
-                .with(Feature::GeometryTextures, geometry.is_some())
-                .with(Feature::BinaryNodes, cache.hierarchy() == HierarchyKind::Binary),
-            constants: KernelConstants {
-                stack_size: placement.stack_size,
-                root_node: placement.root,
-                environment_cells: environment.cells_size,
-            },
+            features,
+            constants,
             bindings: SceneBindings {
                 buffers,
                 textures: [

@@ -342,7 +342,7 @@ impl ViewRenderer {
                 (5, hits.as_entire_binding()),
             ],
         );
-        draw.cover(encoder, target.view, &group, target.part);
+        draw.cover(encoder, target.view, &[&group], target.part);
         self.last = Some(settings.projection);
         Ok(())
     }

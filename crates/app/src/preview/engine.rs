@@ -39,6 +39,7 @@ mod priority;
 mod rate;
 mod readout;
 mod saving;
+mod sketch;
 
 use devices::Screen;
 pub use devices::{Devices, Picture};
@@ -328,6 +329,8 @@ impl Worker {
         let prepares = self.tracing.must_prepare(look);
         if prepares {
             self.busy(Some("preparing the scene".into()));
+            // What stands in a sketch's way stands in the scene's too, and is told with that.
+            let _ = self.show_sketch(look);
         }
         // The window may have been drawn long ago; the eye has moved since.
         let target = self.gaze.target_for_batch(Instant::now(), &look.standpoint.view);

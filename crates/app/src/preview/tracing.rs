@@ -27,9 +27,11 @@ use crate::tev::TevPicture;
 use crate::view::View;
 use compare::Side;
 use seeing::Seeing;
+pub use sketch::SKETCH_COARSENESS;
 
 mod compare;
 mod seeing;
+mod sketch;
 
 /// Samples at which a pixel counts as much as what is around it and what was there before, while the picture moves. With 1 up to 2.2 %
 /// of a moving picture of the built-in scene were black, with 16 up to 0.22 %, with 32 none (`tests/films/moving.rs`).
@@ -61,6 +63,8 @@ struct Open {
     scene: Arc<Scene>,
     renderer: Option<Renderer>,
     plan: Option<FilmPlan>,
+    /// A renderer that has the scene's geometry, and will trace it by this plan.
+    sketched: Option<(Renderer, FilmPlan)>,
 }
 
 struct Target {
@@ -133,7 +137,7 @@ impl Tracing {
                     side.follow_scene(renderer)?;
                 }
             }
-            _ => self.open = Some(Open { scene, renderer: None, plan: None }),
+            _ => self.open = Some(Open { scene, renderer: None, plan: None, sketched: None }),
         }
         self.traced = Duration::ZERO;
         Ok(())
@@ -232,13 +236,13 @@ impl Tracing {
                 renderer.set_distribution(distribution)?;
             }
             None => {
-                let options = RendererOptions {
-                    film: plan.options,
-                    max_bounces: self.args.sampling.max_bounces,
-                    seed: self.args.sampling.seed,
-                    sequence: self.args.sampling.sequence.into(),
+                let mut renderer = match open.sketched.take() {
+                    Some((mut renderer, of)) if of == plan => {
+                        renderer.set_distribution(distribution)?;
+                        renderer
+                    }
+                    _ => Renderer::new(&self.gpu, &renderer_options(&self.args, plan), distribution)?,
                 };
-                let mut renderer = Renderer::new(&self.gpu, &options, distribution)?;
                 self.scene_report = Some(timed_set_scene(&mut renderer, &open.scene)?);
                 open.renderer = Some(renderer);
             }
@@ -346,7 +350,7 @@ impl Tracing {
 
     fn give_up_film(&mut self) {
         if let Some(open) = &mut self.open {
-            (open.renderer, open.plan) = (None, None);
+            (open.renderer, open.plan, open.sketched) = (None, None, None);
         }
         self.keeps_film = false;
         self.beside = None;
@@ -375,13 +379,7 @@ impl Tracing {
     /// Draws the picture, with one texel for `coarseness` by `coarseness` pixels, and waits for it.
     pub fn show(&mut self, look: &Look, coarseness: u32) -> anyhow::Result<Picture> {
         let size = self.picture_size(look, coarseness);
-        if self.target.as_ref().is_none_or(|target| [target.texture.width(), target.texture.height()] != size) {
-            self.generations += 1;
-            let texture = readback::picture_texture(&self.gpu, size);
-            let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-            self.target = Some(Target { texture, picture: Picture::drawn(view, self.generations) });
-        }
-        let picture = self.target.as_ref().context("made above")?.picture.clone();
+        let picture = self.target(size)?;
         let settings = view_settings(look, size);
         self.find_first_hits(&settings)?;
         let mut encoder =
@@ -392,6 +390,17 @@ impl Tracing {
         self.gpu.wait()?;
         self.look_at_picture(look, &settings)?;
         Ok(picture)
+    }
+
+    /// What a picture of so many texels is drawn to.
+    fn target(&mut self, size: [u32; 2]) -> anyhow::Result<Picture> {
+        if self.target.as_ref().is_none_or(|target| [target.texture.width(), target.texture.height()] != size) {
+            self.generations += 1;
+            let texture = readback::picture_texture(&self.gpu, size);
+            let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+            self.target = Some(Target { texture, picture: Picture::drawn(view, self.generations) });
+        }
+        Ok(self.target.as_ref().context("made above")?.picture.clone())
     }
 
     fn picture_size(&self, look: &Look, coarseness: u32) -> [u32; 2] {
@@ -463,6 +472,16 @@ impl Tracing {
     /// The renderer, once a film is planned.
     pub fn renderer(&mut self) -> anyhow::Result<&mut Renderer> {
         self.open.as_mut().and_then(|open| open.renderer.as_mut()).context("no scene is open")
+    }
+}
+
+fn renderer_options(args: &PreviewArgs, plan: FilmPlan) -> RendererOptions {
+    let sampling = &args.sampling;
+    RendererOptions {
+        film: plan.options,
+        max_bounces: sampling.max_bounces,
+        seed: sampling.seed,
+        sequence: sampling.sequence.into(),
     }
 }
 

@@ -74,9 +74,11 @@ fn the_built_in_scene_is_measured_part_by_part() {
     for state in ["cold", "cached"] {
         for run in scene["start"][state].as_array().unwrap() {
             let process = run["process_s"].as_f64().unwrap();
-            let stages = ["device_s", "import_s", "bvh_build_s", "upload_s", "kernels_s", "first_batch_s", "picture_s"];
+            let stages = ["device_s", "import_s", "sketch_s", "upload_s", "kernels_s", "first_batch_s", "picture_s"];
             let sum: f64 = stages.iter().map(|stage| run[stage].as_f64().unwrap()).sum();
             assert!(sum > 0.0 && sum < process, "{run}");
+            let sketched = run["until_sketch_s"].as_f64().unwrap();
+            assert!(sketched > run["device_s"].as_f64().unwrap() && sketched < process, "{run}");
         }
     }
     let page = std::fs::read_to_string(pages.join("speed.md")).unwrap();

@@ -171,7 +171,7 @@ impl Pipeline {
         &self,
         encoder: &mut wgpu::CommandEncoder,
         target: &wgpu::TextureView,
-        group: &Option<wgpu::BindGroup>,
+        groups: &[&Option<wgpu::BindGroup>],
         part: Option<[u32; 4]>,
     ) {
         let PipelineKind::Render(pipeline) = &self.kind else { panic!("{} is no render kernel", self.label) };
@@ -190,8 +190,10 @@ impl Pipeline {
             pass.set_scissor_rect(left, top, width, height);
         }
         pass.set_pipeline(pipeline);
-        if let Some(group) = group {
-            pass.set_bind_group(0, group, &[]);
+        for (index, group) in groups.iter().enumerate() {
+            if let Some(group) = group {
+                pass.set_bind_group(index as u32, group, &[]);
+            }
         }
         pass.draw(0..3, 0..1);
     }

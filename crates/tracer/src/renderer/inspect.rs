@@ -36,7 +36,7 @@ impl Renderer {
         if rows == 0 {
             return Ok(true);
         }
-        let params = params(&of, hits.rows, rows);
+        let params = first_hit_params(&of, hits.rows, rows);
         let params = gpu.buffer("first hits", bytemuck::bytes_of(&params), wgpu::BufferUsages::UNIFORM);
         let group = kernel.bind(
             &gpu.device,
@@ -110,7 +110,7 @@ impl Renderer {
         self.view.hits.take_if(|hits| hits.of != of);
     }
 
-    fn hits_of(&self, settings: &ViewSettings) -> HitsOf {
+    pub(super) fn hits_of(&self, settings: &ViewSettings) -> HitsOf {
         HitsOf {
             projection: settings.projection,
             size: settings.size,
@@ -123,7 +123,7 @@ impl Renderer {
 }
 
 /// Of a band of rows.
-fn params(of: &HitsOf, first_row: u32, rows: u32) -> FirstHitParams {
+pub(super) fn first_hit_params(of: &HitsOf, first_row: u32, rows: u32) -> FirstHitParams {
     let (rotation, half_extent) = match of.projection {
         ViewProjection::Perspective(view) => (view.world_from_view, view.half_extent.to_array()),
         ViewProjection::Film => (of.world_from_film, of.film.half_extent()),

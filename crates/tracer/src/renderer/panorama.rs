@@ -121,7 +121,7 @@ impl Renderer {
         all.extend(resources.iter().cloned());
         let group = pipeline.bind(&self.gpu.device, 0, &all);
         let part = [0, rows.first_row, params.size[0], rows.rows];
-        pipeline.cover(encoder, target, &group, Some(part));
+        pipeline.cover(encoder, target, &[&group], Some(part));
     }
 
     fn uniform(&self, contents: &[u8]) -> wgpu::Buffer {
@@ -173,7 +173,7 @@ impl Renderer {
                 (4, wgpu::BindingResource::Sampler(&panorama.sampler)),
             ],
         );
-        pipeline.cover(encoder, target, &group, None);
+        pipeline.cover(encoder, target, &[&group], None);
         Ok(())
     }
 }

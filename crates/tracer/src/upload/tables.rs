@@ -59,6 +59,17 @@ impl Tables {
         ])))
     }
 
+    /// As group 1 of the path kernels binds them.
+    pub(super) fn resources(&self) -> Vec<(u32, wgpu::BindingResource<'_>)> {
+        match self {
+            Self::Buffers(buffers) => (0..).zip(buffers.iter().map(wgpu::Buffer::as_entire_binding)).collect(),
+            Self::Textures(tables) => {
+                let views = tables.iter().map(|pages| wgpu::BindingResource::TextureView(&pages.view));
+                (13..).zip(views).collect()
+            }
+        }
+    }
+
     /// On the device.
     pub(super) fn bytes(&self) -> u64 {
         match self {

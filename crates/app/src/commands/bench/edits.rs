@@ -10,7 +10,7 @@ use tracer::gpu::Gpu;
 use tracer::renderer::Renderer;
 use tracer::scene::Scene;
 
-use super::subject::{Picture, Subject};
+use super::subject::{PICTURE_PX, Picture, Subject};
 use crate::cli::bench::BenchArgs;
 use crate::commands::study::plan::{FOVEA_DEG, Method, Place};
 
@@ -25,7 +25,7 @@ pub fn measure(gpu: &Gpu, args: &BenchArgs, subject: &Subject) -> anyhow::Result
     let mut scene = (*subject.scene).clone();
     let (mut renderer, _) = subject.renderer(gpu, args, &scene)?;
     let place = subject.places.first().context("no gaze")?;
-    let picture = Picture::new(gpu, place);
+    let picture = Picture::new(gpu, place, PICTURE_PX);
     renderer.set_distribution(subject.distribution(Method::FvClip, place))?;
     renderer.trace(SAMPLES)?;
     picture.draw(&mut renderer)?;
@@ -72,7 +72,7 @@ fn looks_elsewhere(
 ) -> anyhow::Result<Vec<f64>> {
     let mut seconds = Vec::new();
     for place in subject.places.iter().cycle().skip(1).take(args.rounds as usize) {
-        let picture = Picture::new(gpu, place);
+        let picture = Picture::new(gpu, place, PICTURE_PX);
         gpu.wait()?;
         let started = Instant::now();
         renderer.set_distribution(subject.distribution(Method::FvClip, place))?;

@@ -38,7 +38,7 @@ pub fn measure(gpu: &Gpu, args: &BenchArgs, subject: &Subject) -> anyhow::Result
     let (mut renderer, report) = subject.renderer(gpu, args, &subject.scene)?;
     let mut rows = Vec::new();
     for (number, place) in subject.places.iter().enumerate() {
-        let picture = Picture::new(gpu, place);
+        let picture = Picture::new(gpu, place, PICTURE_PX);
         let mut passes: [Passes; MODES.len()] = Default::default();
         // The first round compiles the kernels.
         let untimed = u32::from(number == 0);

@@ -333,11 +333,12 @@ fn start(scenes: &Found<'_>) -> String {
     let mut text = table(&[
         "scene",
         "kernels",
-        "process s",
+        "until the sketch, s",
+        "until the end, s",
         "device",
         "import",
-        "hierarchies",
-        "upload",
+        "hierarchies and sketch",
+        "upload of the rest",
         "kernels",
         "light split and film",
         "first 2^14 samples",
@@ -347,11 +348,16 @@ fn start(scenes: &Found<'_>) -> String {
         for state in ["cold", "cached"] {
             let all = rows(found, state);
             let of = |what: &str| all.iter().map(|run| number(&run[what])).collect::<Vec<_>>();
-            let mut cells = vec![(*name).to_owned(), state.to_owned(), spread(&of("process_s"), 2)];
+            let mut cells = vec![
+                (*name).to_owned(),
+                state.to_owned(),
+                spread(&of("until_sketch_s"), 2),
+                spread(&of("process_s"), 2),
+            ];
             for stage in [
                 "device_s",
                 "import_s",
-                "bvh_build_s",
+                "sketch_s",
                 "upload_s",
                 "kernels_s",
                 "rest_of_scene_s",

@@ -1,19 +1,21 @@
-//! From the start of a process to its first picture: device, import, hierarchies, upload, kernels, a first batch, and its
-//! reconstruction at 1280x720, without a window. Timed from outside, so that loading the program counts.
+//! From the start of a process to its first pictures, without a window: device, import, hierarchies and a sketch of first hits, as
+//! coarse as the window's; then upload, kernels, a first batch, and its reconstruction at 1280x720. Timed from outside, so that
+//! loading the program counts.
 
 use std::ffi::OsString;
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::time::Instant;
+use std::time::{Instant, SystemTime};
 
 use anyhow::{Context, ensure};
 use serde_json::{Value, json};
 use tracer::gpu::{AdapterSelect, Gpu};
 use tracer::renderer::FIRST_BATCH;
 
-use super::subject::{Picture, Subject};
+use super::subject::{PICTURE_PX, Picture, Subject};
 use crate::cli::bench::BenchArgs;
 use crate::commands::print_json;
+use crate::preview::tracing::SKETCH_COARSENESS;
 
 /// Shows the scene once: what the process that is timed does.
 ///
@@ -30,21 +32,31 @@ pub fn show(args: &BenchArgs) -> anyhow::Result<()> {
     let device = since();
     let subject = Subject::open(args)?;
     let import = since();
-    let (mut renderer, report) = subject.renderer(&gpu, args, &subject.scene)?;
+    let place = subject.places.first().context("no gaze")?;
+    let mut renderer = subject.empty_renderer(&gpu, args)?;
+    let coarseness = if gpu.is_software() { SKETCH_COARSENESS } else { 1 };
+    Picture::new(&gpu, place, PICTURE_PX.map(|pixels| pixels / coarseness)).sketch(&mut renderer, &subject.scene)?;
+    let sketch = since();
+    let sketched_at = unix_secs()?;
+    let report = renderer.set_scene(&subject.scene)?;
     let set = since();
     renderer.trace(FIRST_BATCH)?;
     gpu.wait()?;
     let batch = since();
-    let place = subject.places.first().context("no gaze")?;
-    Picture::new(&gpu, place).draw(&mut renderer)?;
+    Picture::new(&gpu, place, PICTURE_PX).draw(&mut renderer)?;
     let picture = since();
     let compile = report.kernel_compile_secs;
     print_json(&json!({
-        "device_s": device, "import_s": import, "bvh_build_s": report.upload.bvh_build_secs,
-        "upload_s": report.upload.upload_secs, "kernels_s": compile,
+        "device_s": device, "import_s": import, "sketch_s": sketch, "sketched_at_unix_s": sketched_at,
+        "upload_s": report.upload.bvh_build_secs + report.upload.upload_secs, "kernels_s": compile,
         "rest_of_scene_s": set - report.upload.bvh_build_secs - report.upload.upload_secs - compile,
         "first_batch_s": batch, "picture_s": picture,
     }))
+}
+
+/// What two processes can compare.
+fn unix_secs() -> anyhow::Result<f64> {
+    Ok(SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).context("the clock is before 1970")?.as_secs_f64())
 }
 
 /// Times processes of this program: each first with an empty folder for the driver's cache, then with what it left there.
@@ -71,12 +83,13 @@ fn first_picture(args: &BenchArgs, folder: &Path) -> anyhow::Result<Value> {
     let mut command = Command::new(std::env::current_exe().context("the program's own file")?);
     command.args(words(args)).stderr(Stdio::null());
     command.env("MESA_SHADER_CACHE_DIR", folder).env_remove("MESA_SHADER_CACHE_DISABLE");
-    let started = Instant::now();
+    let (started, started_at) = (Instant::now(), unix_secs()?);
     let output = command.output().context("the program itself")?;
     let seconds = started.elapsed().as_secs_f64();
     ensure!(output.status.success(), "the process that shows the scene failed");
     let mut stages: Value = serde_json::from_slice(&output.stdout).context("what that process says")?;
     stages["process_s"] = seconds.into();
+    stages["until_sketch_s"] = stages["sketched_at_unix_s"].as_f64().map(|at| at - started_at).into();
     Ok(stages)
 }
 

@@ -87,15 +87,24 @@ impl Subject {
         scene: &Scene,
         hierarchy: Option<HierarchyKind>,
     ) -> anyhow::Result<(Renderer, SceneReport)> {
-        let options = RendererOptions { film: self.film, max_bounces: args.max_bounces, ..Default::default() };
-        let first = self.places.first().context("no gaze")?;
-        let mut renderer = Renderer::new(gpu, &options, self.distribution(Method::Fv, first))?;
+        let mut renderer = self.empty_renderer(gpu, args)?;
         if let Some(kind) = hierarchy {
             renderer.set_hierarchy(kind);
         }
         let report = renderer.set_scene(scene)?;
-        renderer.set_pose(self.pose);
         Ok((renderer, report))
+    }
+
+    /// A renderer at the film's place, without a scene.
+    ///
+    /// # Errors
+    /// When the film does not fit the adapter.
+    pub fn empty_renderer(&self, gpu: &Gpu, args: &BenchArgs) -> anyhow::Result<Renderer> {
+        let options = RendererOptions { film: self.film, max_bounces: args.max_bounces, ..Default::default() };
+        let first = self.places.first().context("no gaze")?;
+        let mut renderer = Renderer::new(gpu, &options, self.distribution(Method::Fv, first))?;
+        renderer.set_pose(self.pose);
+        Ok(renderer)
     }
 }
 
@@ -119,15 +128,24 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Of the view about a place.
-    pub fn new(gpu: &Gpu, place: &Place) -> Self {
-        let texture = picture_texture(gpu, PICTURE_PX);
-        let mut settings = bench::settings(ViewProjection::Perspective(place.view), PICTURE_PX);
+    /// Of the view about a place, so many pixels across and down.
+    pub fn new(gpu: &Gpu, place: &Place, size_px: [u32; 2]) -> Self {
+        let texture = picture_texture(gpu, size_px);
+        let mut settings = bench::settings(ViewProjection::Perspective(place.view), size_px);
         // A view as a window has it: 90 degrees across, square pixels.
         let mut view = place.view;
         view.half_extent = glam::Vec2::new(1.0, PICTURE_PX[1] as f32 / PICTURE_PX[0] as f32);
         settings.projection = ViewProjection::Perspective(view);
         Self { target: texture.create_view(&wgpu::TextureViewDescriptor::default()), settings }
+    }
+
+    /// Draws what a scene shows first and waits.
+    ///
+    /// # Errors
+    /// When the geometry does not fit the device or the device is lost.
+    pub fn sketch(&self, renderer: &mut Renderer, scene: &Scene) -> anyhow::Result<()> {
+        renderer.sketch(scene, &self.settings, &self.target, PICTURE_FORMAT)?;
+        Ok(renderer.gpu().wait()?)
     }
 
     /// Draws it and waits. Seconds of the device where it has timestamps.

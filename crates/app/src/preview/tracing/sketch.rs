@@ -1,0 +1,39 @@
+//! A picture of a scene that is still being prepared.
+
+use anyhow::Context;
+use tracer::distribution::Distribution;
+use tracer::renderer::{FilmPose, Renderer};
+
+use super::{Tracing, renderer_options, view_settings};
+use crate::film::FilmPlan;
+use crate::preview::engine::{Look, Picture};
+use crate::readback;
+
+/// Pixels of the view across and down for a texel of the sketch, on an adapter that computes on the CPU: there its rays are most of
+/// the time until it is seen.
+pub const SKETCH_COARSENESS: u32 = 2;
+
+impl Tracing {
+    /// Draws a scene that was opened and is not traced yet, in the mean colours of its surfaces; `None` where there is none. What
+    /// this puts on the device is there for [`Tracing::follow`] with the same look, which takes much longer.
+    pub fn sketch(&mut self, look: &Look) -> anyhow::Result<Option<Picture>> {
+        if self.open.as_ref().is_none_or(|open| open.renderer.is_some()) {
+            return Ok(None);
+        }
+        let inverse = self.inverse(look.controls.acuity)?;
+        let coarseness = if self.gpu.is_software() { SKETCH_COARSENESS } else { 1 };
+        let size = self.picture_size(look, coarseness);
+        let picture = self.target(size)?;
+        let open = self.open.as_mut().context("no scene is open")?;
+        let memory = u64::from(self.args.film_memory) << 20;
+        let plan = FilmPlan::new(&look.standpoint.view, look.size_px.as_vec2(), memory);
+        let everywhere = Distribution::omnidirectional(inverse);
+        let renderer = Renderer::new(&self.gpu, &renderer_options(&self.args, plan), everywhere)?;
+        let (renderer, _) = open.sketched.insert((renderer, plan));
+        renderer.set_pose(FilmPose { position: look.standpoint.position, world_from_film: plan.world_from_film });
+        let settings = view_settings(look, size);
+        renderer.sketch(&open.scene, &settings, &picture.texture, readback::PICTURE_FORMAT)?;
+        self.gpu.wait().context("while the scene is sketched")?;
+        Ok(Some(picture))
+    }
+}
