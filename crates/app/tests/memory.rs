@@ -172,6 +172,10 @@ fn growth(what: &str, count: usize, session: &mut Session, mut step: impl FnMut(
     let mut means = [[0.0; 2]; 2];
     for number in 0..count {
         step(session, number);
+        if number % (count / 10) == 0 {
+            let [resident, device] = session.memory().map(|bytes| bytes / 1e6);
+            eprintln!("{what} {number}: {resident:.1} MB resident, {device:.1} MB on the device");
+        }
         for (mean, range) in means.iter_mut().zip([&first, &last]) {
             if range.contains(&number) {
                 let memory = session.memory();
