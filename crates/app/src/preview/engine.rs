@@ -101,6 +101,8 @@ pub struct State {
     pub message: Option<Message>,
     /// The picture, once there is one.
     pub picture: Option<Picture>,
+    /// That is a sketch of a scene that is not traced yet.
+    pub is_sketch: bool,
     /// Figures.
     pub readout: Readout,
     /// The film's size, such as `4096x2048`.
@@ -423,7 +425,7 @@ impl Worker {
         let (readout, film) = (self.readout(), self.film_words());
         let version = self.tracing.scene_report().map(|(report, took)| ShownVersion::new(self.versions, report, took));
         let mut state = lock(&self.shared.state);
-        state.picture = Some(picture);
+        (state.picture, state.is_sketch) = (Some(picture), false);
         state.version = version.unwrap_or_default();
         state.readout = readout;
         state.film = film;

@@ -67,7 +67,8 @@ impl Screenshot {
             self.leave(ctx, written.map(|()| self.figures(state, more())).map_err(Into::into));
             return;
         }
-        let failed = state.picture.is_none() && state.busy.is_none();
+        let waits = state.picture.is_none() || state.is_sketch;
+        let failed = waits && state.busy.is_none();
         let reason = match trouble.or(state.message.as_ref()) {
             _ if state.dead => Some("the renderer has stopped"),
             Some(message) if message.wrong && failed => Some(message.text.as_str()),
@@ -77,7 +78,7 @@ impl Screenshot {
             self.leave(ctx, Err(anyhow::anyhow!("{reason}")));
             return;
         }
-        if state.picture.is_none() {
+        if waits {
             return;
         }
         let now = Instant::now();

@@ -13,7 +13,9 @@ impl Worker {
             let (size, texels) = self.tracing.texels()?;
             picture = self.screen.show(size, texels, || self.tracing.next_generation());
         }
-        lock(&self.shared.state).picture = Some(picture);
+        let mut state = lock(&self.shared.state);
+        (state.picture, state.is_sketch) = (Some(picture), true);
+        drop(state);
         (self.repaint)();
         Ok(())
     }
