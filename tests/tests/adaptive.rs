@@ -125,7 +125,7 @@ fn means_stay_unbiased_while_another_film_steers_and_a_weighted_sample_is_notice
     let weighted = |sources: &ShaderSources| {
         exchanged(
             sources,
-            "path::trace",
+            "path::start",
             &[
                 (
                     "path.pixel = choose_pixel(first_random_2(&random), random);",

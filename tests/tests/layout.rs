@@ -7,7 +7,7 @@ use std::{collections::BTreeSet, sync::Arc};
 use fovea_tests::{device, scenes};
 use glam::Vec3;
 use naga::{
-    TypeInner,
+    AddressSpace, TypeInner,
     valid::{Capabilities, ValidationFlags, Validator},
 };
 use tracer::{
@@ -19,6 +19,9 @@ use tracer::{
     },
     view::DebugView,
 };
+
+/// SwiftShader has no more a stage.
+const MOST_STORAGE_BUFFERS: usize = 10;
 
 fn sources() -> Arc<ShaderSources> {
     Arc::new(ShaderSources::new(&device::inverse()))
@@ -108,7 +111,7 @@ fn permutations_validate_and_structures_lie_as_on_the_host() {
     let sources = sources();
     let twins = shared_layouts();
     let mut seen = BTreeSet::new();
-    let mut count = 0;
+    let (mut count, mut most_buffers) = (0, 0);
     for kernel in Kernel::ALL {
         for features in permutations() {
             // Only the path kernels look at the scene's features, and all at the film's; the gathering looks for guides.
@@ -121,6 +124,10 @@ fn permutations_validate_and_structures_lie_as_on_the_host() {
             let key = key(kernel, features, &sources);
             let module = parsed_and_valid(&key);
             count += 1;
+            let is_storage = |variable: &naga::GlobalVariable| matches!(variable.space, AddressSpace::Storage { .. });
+            let buffers = module.global_variables.iter().filter(|(_, variable)| is_storage(variable)).count();
+            assert!(buffers <= MOST_STORAGE_BUFFERS, "{key} binds {buffers} storage buffers");
+            most_buffers = most_buffers.max(buffers);
             for (_, ty) in module.types.iter() {
                 let Some(name) = &ty.name else { continue };
                 let own = name.rsplit('_').next().unwrap();
@@ -131,7 +138,9 @@ fn permutations_validate_and_structures_lie_as_on_the_host() {
             }
         }
     }
-    eprintln!("{count} kernels");
+    eprintln!("{count} kernels; at most {most_buffers} storage buffers");
+    // Else the count would say nothing.
+    assert_eq!(most_buffers, MOST_STORAGE_BUFFERS);
     let all: BTreeSet<_> = twins.iter().map(|twin| twin.name).collect();
     assert_eq!(seen, all, "some shared structure occurs in no kernel");
 }

@@ -245,7 +245,7 @@ fn a_density_wrong_by_2_percent_in_one_layer_is_noticed() {
     assert_noticed(&case, |sources| {
         exchanged(
             sources,
-            "path::trace",
+            "path::start",
             &[
                 (
                     "path.pixel = choose_pixel(first_random_2(&random), random);",
@@ -270,7 +270,7 @@ fn a_position_drawn_by_the_density_is_noticed() {
     assert_noticed(&case, |sources| {
         exchanged(
             sources,
-            "path::trace",
+            "path::start",
             &[
                 (
                     "path.pixel = choose_pixel(first_random_2(&random), random);",

@@ -37,6 +37,8 @@ pub const GLASS_SIZE: u32 = 20;
 pub const GLASS_LAYERS: u32 = 33;
 /// Russian roulette starts at this bounce.
 pub const FIRST_ROULETTE_BOUNCE: u32 = 4;
+/// Words of a path queue before its paths: their number, workgroups for them, two unused.
+pub const QUEUE_HEADER_WORDS: u32 = 4;
 
 /// The shader modules, by their path below `shaders/`.
 const MODULES: &[(&str, &str)] = &[
@@ -69,6 +71,14 @@ const MODULES: &[(&str, &str)] = &[
     ("light::emitters", include_str!("../../../shaders/light/emitters.wesl")),
     ("path::trace", include_str!("../../../shaders/path/trace.wesl")),
     ("path::shade", include_str!("../../../shaders/path/shade.wesl")),
+    ("path::start", include_str!("../../../shaders/path/start.wesl")),
+    ("path::extend", include_str!("../../../shaders/path/extend.wesl")),
+    ("wavefront::bindings", include_str!("../../../shaders/wavefront/bindings.wesl")),
+    ("wavefront::queue", include_str!("../../../shaders/wavefront/queue.wesl")),
+    ("wavefront::state", include_str!("../../../shaders/wavefront/state.wesl")),
+    ("wavefront::start", include_str!("../../../shaders/wavefront/start.wesl")),
+    ("wavefront::extend", include_str!("../../../shaders/wavefront/extend.wesl")),
+    ("wavefront::shade", include_str!("../../../shaders/wavefront/shade.wesl")),
     ("path::generate", include_str!("../../../shaders/path/generate.wesl")),
     ("view::bindings", include_str!("../../../shaders/view/bindings.wesl")),
     ("view::gather", include_str!("../../../shaders/view/gather.wesl")),
@@ -106,6 +116,12 @@ const MODULES: &[(&str, &str)] = &[
 pub enum Kernel {
     /// Path tracing: one sample an invocation.
     Trace,
+    /// Wavefront schedule: pixels and primary rays of a batch's samples.
+    Start,
+    /// Wavefront schedule: what the rays of the queued paths meet.
+    Extend,
+    /// Wavefront schedule: shading of what was met, and the next rays.
+    Shade,
     /// Only the choice of the pixel and the primary ray, for the bench of ray generation.
     Generate,
     /// How noisy the film is where the samples of each cell of the unit square fall.
@@ -156,8 +172,11 @@ pub enum Kernel {
 
 impl Kernel {
     /// Every kernel.
-    pub const ALL: [Self; 24] = [
+    pub const ALL: [Self; 27] = [
         Self::Trace,
+        Self::Start,
+        Self::Extend,
+        Self::Shade,
         Self::Generate,
         Self::Noise,
         Self::Query,
@@ -187,6 +206,9 @@ impl Kernel {
     pub const fn module(self) -> &'static str {
         match self {
             Self::Trace => "path::trace",
+            Self::Start => "wavefront::start",
+            Self::Extend => "wavefront::extend",
+            Self::Shade => "wavefront::shade",
             Self::Generate => "path::generate",
             Self::Noise => "sampling::noise",
             Self::Query => "scene::query",
@@ -229,13 +251,22 @@ impl Kernel {
 
     /// Whether the scene's features are flags of this kernel.
     pub const fn reads_scene(self) -> bool {
-        matches!(self, Self::Trace | Self::Generate | Self::Query | Self::FirstHit | Self::Sketch)
+        self.traces_paths()
+            || matches!(self, Self::Start | Self::Generate | Self::Query | Self::FirstHit | Self::Sketch)
+    }
+
+    /// Whether this extends or shades paths, by what the scene and the technique need.
+    pub const fn traces_paths(self) -> bool {
+        matches!(self, Self::Trace | Self::Extend | Self::Shade)
     }
 
     /// Name of the entry point (the fragment entry where the kernel draws).
     pub const fn entry_point(self) -> &'static str {
         match self {
             Self::Trace => "trace",
+            Self::Start => "start",
+            Self::Extend => "extend_queued",
+            Self::Shade => "shade_queued",
             Self::Generate => "generate",
             Self::Noise => "noise",
             Self::Query => "query",
@@ -403,6 +434,7 @@ fn constants_module(c: &KernelConstants) -> String {
         ("GLASS_SIZE", GLASS_SIZE),
         ("GLASS_LAYERS", GLASS_LAYERS),
         ("FIRST_ROULETTE_BOUNCE", FIRST_ROULETTE_BOUNCE),
+        ("QUEUE_HEADER_WORDS", QUEUE_HEADER_WORDS),
         ("GUIDE_COLUMNS_PER_ROW", GUIDE_COLUMNS_PER_ROW),
         ("GUIDE_POINTS", GUIDE_POINTS),
         ("HISTOGRAM_BINS", HISTOGRAM_BINS as u32),

@@ -14,9 +14,11 @@ mod options;
 mod panorama;
 mod query;
 mod restore;
+mod schedule;
 mod sketch;
 mod split;
 mod timing;
+mod wavefront;
 
 use batch::BoundKernels;
 pub use options::{
@@ -25,7 +27,8 @@ pub use options::{
 pub use panorama::Refreshed;
 pub use query::{Query, QueryAnswer, RayKind};
 pub use restore::RestoreError;
-pub use timing::BatchSeconds;
+pub use schedule::Schedule;
+pub use timing::{BatchSeconds, StageSeconds};
 
 use crate::{
     bvh::HierarchyKind,
@@ -104,6 +107,9 @@ pub struct Renderer {
     /// One per slab of the film: they differ in the slab alone.
     params: Vec<wgpu::Buffer>,
     records: wgpu::Buffer,
+    schedule: Schedule,
+    /// Of the wavefront schedule, once it was asked for.
+    path_buffers: Option<wavefront::PathBuffers>,
     /// In the film.
     samples: u64,
     first_sample: u64,
@@ -156,6 +162,8 @@ impl Renderer {
             bound: None,
             params,
             records,
+            schedule: Schedule::preferred_on(gpu),
+            path_buffers: None,
             samples: 0,
             first_sample: 0,
             next_sample: 0,
@@ -379,21 +387,19 @@ impl Renderer {
     }
 
     /// Records and submits one batch of at most `samples` samples and returns how many; does not wait, unless noise is judged
-    /// ([`Renderer::set_adaptive`]).
+    /// ([`Renderer::set_adaptive`]), or paths may outlive the rounds of [`Schedule::Wavefront`]: through clear sheets, or with more
+    /// than 31 bounces.
     ///
     /// Batches are powers of two, aligned in the sequence, up to [`LARGEST_BATCH`]: the first after a restart can have
     /// any such size, the next at most as many as are done already, and so on.
     ///
     /// # Errors
-    /// When there is no scene, or the device is lost while noise is judged.
+    /// When there is no scene, or the device is lost while it is waited for.
     pub fn trace(&mut self, samples: u32) -> Result<u32, RenderError> {
         self.follow_noise()?;
         let samples = self.next_batch(samples);
         self.write_params(samples)?;
-        let bound = self.bound.as_ref().ok_or(RenderError::NoScene)?;
-        let mut encoder = self.encoder("batch");
-        bound.record(&mut encoder, samples);
-        self.gpu.queue.submit([encoder.finish()]);
+        self.submit_batch(self.path_batch(samples))?;
         self.samples += u64::from(samples);
         self.next_sample += u64::from(samples);
         self.count_steered(samples);
@@ -495,7 +501,7 @@ impl Renderer {
         let own = scene.map(|s| s.features).unwrap_or_default();
         let features = if matches!(kernel, Kernel::Query | Kernel::FirstHit) {
             own
-        } else if kernel == Kernel::Trace {
+        } else if kernel.traces_paths() {
             own.union(self.spare_features)
                 .with(Feature::LightSamplingOnly, self.technique == SamplingTechnique::Lights)
                 .with(Feature::BsdfSamplingOnly, self.technique == SamplingTechnique::Bsdf)
@@ -505,7 +511,7 @@ impl Renderer {
         KernelKey {
             kernel,
             features: features.with(Feature::PerspectiveFilm, perspective),
-            constants: if matches!(kernel, Kernel::Trace | Kernel::Query | Kernel::FirstHit) {
+            constants: if kernel.traces_paths() || matches!(kernel, Kernel::Query | Kernel::FirstHit) {
                 scene.map(|s| s.constants).unwrap_or_default()
             } else {
                 KernelConstants::default()

@@ -112,6 +112,35 @@ shared! {
         pad_0: [u32; 2],
     }
 
+    /// What lies in memory of a path between two kernels of the wavefront schedule, beside its record.
+    struct PathState {
+        origin: [f32; 3],
+        has_extension: u32,
+        direction: [f32; 3],
+        shadow_t_max: f32,
+        shadow_origin: [f32; 3],
+        bounce: u32,
+        shadow_direction: [f32; 3],
+        density: f32,
+        contribution: [f32; 3],
+        travelled: f32,
+        throughput: [f32; 3],
+        random_index: u32,
+        random_seed: u32,
+        random_pair: u32,
+        hit_t: f32,
+        hit_instance: u32,
+        hit_barycentrics: [f32; 2],
+        hit_triangle: u32,
+        pad_0: u32,
+    }
+
+    /// Which queue a kernel of the wavefront schedule reads and which one it appends to.
+    struct QueueTurn {
+        read_from: u32,
+        append_to: u32,
+    }
+
     /// What the film says about the pixels of some points of a cell of the unit square. Luminance is in its own quanta.
     struct CellNoise {
         points: f32,

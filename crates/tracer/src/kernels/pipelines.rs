@@ -152,6 +152,25 @@ impl Pipeline {
         groups: &[&Option<wgpu::BindGroup>],
         workgroups: [u32; 2],
     ) {
+        self.set(pass, groups);
+        pass.dispatch_workgroups(workgroups[0], workgroups[1], 1);
+    }
+
+    /// The same with as many workgroups as a buffer says: three words, for the axes.
+    ///
+    /// # Panics
+    /// On a render pipeline, which is a bug in this crate.
+    pub fn dispatch_indirect(
+        &self,
+        pass: &mut wgpu::ComputePass<'_>,
+        groups: &[&Option<wgpu::BindGroup>],
+        workgroups: &wgpu::Buffer,
+    ) {
+        self.set(pass, groups);
+        pass.dispatch_workgroups_indirect(workgroups, 0);
+    }
+
+    fn set(&self, pass: &mut wgpu::ComputePass<'_>, groups: &[&Option<wgpu::BindGroup>]) {
         let PipelineKind::Compute(pipeline) = &self.kind else { panic!("{} is no compute kernel", self.label) };
         pass.set_pipeline(pipeline);
         for (index, group) in groups.iter().enumerate() {
@@ -159,7 +178,6 @@ impl Pipeline {
                 pass.set_bind_group(index as u32, group, &[]);
             }
         }
-        pass.dispatch_workgroups(workgroups[0], workgroups[1], 1);
     }
 
     /// Covers a target with this kernel, in a pass of its own: all of it whatever it holds, or only a `part` (left, top, width,

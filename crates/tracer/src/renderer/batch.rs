@@ -4,7 +4,10 @@ use std::sync::Arc;
 
 use glam::Mat3;
 
-use super::{RenderError, Renderer, SequenceKind};
+use super::{
+    RenderError, Renderer, SequenceKind,
+    schedule::{PathBatch, PathKernels},
+};
 use crate::{
     coherence::order_columns,
     guide::Guide,
@@ -19,9 +22,8 @@ use crate::{
 /// Kernels of the present scene and distribution with their bind groups.
 #[derive(Debug)]
 pub(super) struct BoundKernels {
-    pub trace: Arc<Pipeline>,
-    pub trace_groups: [Option<wgpu::BindGroup>; 2],
-    accumulate: Arc<Pipeline>,
+    pub paths: PathKernels,
+    pub accumulate: Arc<Pipeline>,
     accumulate_groups: Vec<Option<wgpu::BindGroup>>,
 }
 
@@ -46,6 +48,11 @@ impl Renderer {
             self.gpu.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&params));
         }
         Ok(())
+    }
+
+    /// So many samples' paths.
+    pub(super) fn path_batch(&self, samples: u32) -> PathBatch {
+        PathBatch { samples, max_bounces: self.options.max_bounces }
     }
 
     /// Of the next batch, but for the slab and the guide.
@@ -102,25 +109,17 @@ impl Renderer {
                 mapped_at_creation: false,
             });
             if let (Some(scene), Some(bound)) = (&self.scene, &mut self.bound) {
-                bound.trace_groups = trace_groups(
-                    &self.gpu.device,
-                    &bound.trace,
-                    scene,
-                    [&self.params[0], &self.records, &self.pixel_list],
-                );
+                bound.paths.rebind(&self.gpu.device, scene, [&self.params[0], &self.records, &self.pixel_list]);
             }
         }
         self.gpu.queue.write_buffer(&self.pixel_list, 0, bytes);
     }
 
     pub(super) fn bind(&mut self) -> Result<(), RenderError> {
-        let trace_key = self.key(Kernel::Trace);
+        let paths = self.path_kernels()?;
         let accumulate_key = self.key(Kernel::Accumulate);
-        let scene = self.scene.as_ref().ok_or(RenderError::NoScene)?;
         let device = &self.gpu.device;
-        let trace = self.pipelines.compute(device, &trace_key)?;
         let accumulate = self.pipelines.compute(device, &accumulate_key)?;
-        let trace_groups = trace_groups(device, &trace, scene, [&self.params[0], &self.records, &self.pixel_list]);
         let accumulate_groups = self
             .film
             .slabs
@@ -139,47 +138,23 @@ impl Renderer {
                 )
             })
             .collect();
-        self.bound = Some(BoundKernels { trace, trace_groups, accumulate, accumulate_groups });
+        self.bound = Some(BoundKernels { paths, accumulate, accumulate_groups });
         Ok(())
     }
 
     /// Dispatches the kernels over no samples: some drivers compile at the first dispatch.
     pub(super) fn warm_up(&mut self) -> Result<(), RenderError> {
         self.write_params(0)?;
-        let bound = self.bound.as_ref().ok_or(RenderError::NoScene)?;
-        let mut encoder = self.encoder("warm-up");
-        bound.record(&mut encoder, 0);
-        self.gpu.queue.submit([encoder.finish()]);
+        self.submit_batch(self.path_batch(0))?;
         self.gpu.wait().map_err(|_| RenderError::DeviceLost)
     }
 }
 
 impl BoundKernels {
-    /// One batch: trace, then add to every slab.
-    pub(super) fn record(&self, encoder: &mut wgpu::CommandEncoder, samples: u32) {
-        let mut pass = self.pass(encoder);
-        self.trace_in(&mut pass, samples);
-        self.accumulate_in(&mut pass, samples);
-    }
-
-    /// Traces without adding to the film: the records are for the host.
-    pub(super) fn record_paths(&self, encoder: &mut wgpu::CommandEncoder, samples: u32) {
-        self.trace_in(&mut self.pass(encoder), samples);
-    }
-
-    pub(super) fn trace_in(&self, pass: &mut wgpu::ComputePass<'_>, samples: u32) {
-        self.trace.dispatch(pass, &[&self.trace_groups[0], &self.trace_groups[1]], workgroups(samples));
-    }
-
     pub(super) fn accumulate_in(&self, pass: &mut wgpu::ComputePass<'_>, samples: u32) {
         for group in &self.accumulate_groups {
             self.accumulate.dispatch(pass, &[group], workgroups(samples));
         }
-    }
-
-    fn pass<'a>(&self, encoder: &'a mut wgpu::CommandEncoder) -> wgpu::ComputePass<'a> {
-        let label = Some(self.trace.label());
-        encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label, timestamp_writes: None })
     }
 }
 

@@ -12,6 +12,7 @@ impl Renderer {
     pub fn beside(&self, distribution: Distribution) -> Result<Self, RenderError> {
         let mut other = Self::new(&self.gpu, &self.options, distribution)?;
         other.pose = self.pose;
+        (other.schedule, other.path_buffers) = (self.schedule, self.path_buffers.clone());
         (other.technique, other.spare_features) = (self.technique, self.spare_features);
         other.set_adaptive(self.is_adaptive());
         other.share_scene_of(self)?;

@@ -3,7 +3,7 @@
 
 use glam::{Mat3, Quat, Vec3};
 
-use super::{FilmPose, RenderError, Renderer};
+use super::{FilmPose, RenderError, Renderer, schedule::PathBatch};
 use crate::{
     distribution::Distribution,
     film::read_ranges,
@@ -66,10 +66,7 @@ impl Renderer {
             ..next
         };
         self.gpu.queue.write_buffer(&self.params[0], 0, bytemuck::bytes_of(&params));
-        let bound = self.bound.as_ref().ok_or(RenderError::NoScene)?;
-        let mut encoder = self.encoder("pilot of the light samples");
-        bound.record_paths(&mut encoder, PILOT_SAMPLES);
-        self.gpu.queue.submit([encoder.finish()]);
+        self.submit_paths(PathBatch { samples: PILOT_SAMPLES, max_bounces })?;
         let bytes = u64::from(PILOT_SAMPLES) * size_of::<SampleRecord>() as u64;
         let records: Vec<SampleRecord> = read_ranges(&self.gpu, &[(&self.records, 0, bytes)])?;
         let luminance = |r: &SampleRecord| f64::from(Vec3::from(r.radiance).dot(Vec3::new(0.2126, 0.7152, 0.0722)));
