@@ -18,7 +18,10 @@ pub mod study;
 pub mod values;
 
 use bench::BenchArgs;
-use choices::{Clip, EccentricityAt, Geometry, InverseForm, Mode, Model, Orient, Sequence, Show, Switch, ToneMapping};
+use choices::{
+    Clip, EccentricityAt, Geometry, InverseForm, Mode, Model, Orient, ScheduleChoice, Sequence, Show, Switch,
+    ToneMapping,
+};
 use gaze::{GazeArgs, PreviewGazeArgs};
 use sampler::SamplerArgs;
 use study::StudyArgs;
@@ -302,6 +305,9 @@ pub struct SamplingArgs {
     /// Low-discrepancy points, or independent ones for statistics
     #[arg(long, value_enum, default_value_t = Sequence::Sobol, value_name = "SEQUENCE")]
     pub sequence: Sequence,
+    /// How kernels share the work of a path; the picture is the same, only its speed differs
+    #[arg(long, value_enum, default_value_t = ScheduleChoice::Auto, value_name = "SCHEDULE")]
+    pub schedule: ScheduleChoice,
     /// More samples to where the film is visibly noisy, fewer to the rest (a quarter at least): clean sooner about the gaze, with a
     /// slight bias that the film's header admits
     #[arg(long)]

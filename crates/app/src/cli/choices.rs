@@ -1,6 +1,8 @@
 //! Options that are one of a few names.
 
 use clap::ValueEnum;
+use tracer::gpu::Gpu;
+use tracer::renderer::Schedule;
 
 /// How samples are distributed over the film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -49,6 +51,28 @@ pub enum Sequence {
     Sobol,
     /// Independent points
     Independent,
+}
+
+/// How kernels share the work of a path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ScheduleChoice {
+    /// What measured faster on most adapters of this kind
+    Auto,
+    /// One kernel traces each path to its end
+    Megakernel,
+    /// Paths advance together, a segment a round: small kernels, queues between them
+    Wavefront,
+}
+
+impl ScheduleChoice {
+    /// What is meant on an adapter.
+    pub fn on(self, gpu: &Gpu) -> Schedule {
+        match self {
+            Self::Auto => Schedule::preferred_on(gpu),
+            Self::Megakernel => Schedule::Megakernel,
+            Self::Wavefront => Schedule::Wavefront,
+        }
+    }
 }
 
 /// Visual acuity models.

@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 use tracer::distribution::{Distribution, View};
 use tracer::film::{FilmMapping, FilmOptions};
 use tracer::gpu::{AdapterSelect, Gpu};
-use tracer::renderer::{FilmPose, RenderStatistics, Renderer, RendererOptions, SceneReport, StopCondition};
+use tracer::renderer::{FilmPose, RenderStatistics, Renderer, RendererOptions, SceneReport, Schedule, StopCondition};
 use tracer::scene::Scene;
 use tracer::view::{ViewProjection, ViewSettings};
 
@@ -71,6 +71,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     };
     let inverse = args.sampling.acuity().inverse()?;
     let mut renderer = Renderer::new(&gpu, &options, aim.distribution(&film, pose.world_from_film, &inverse))?;
+    renderer.set_schedule(args.sampling.schedule.on(&gpu))?;
     let prepared = renderer.set_scene(&scene)?;
     renderer.set_pose(pose);
     renderer.set_first_sample(args.first_sample);
@@ -109,7 +110,8 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
         }
     }
     if args.json {
-        let run = Run { seconds, import_seconds, prepared, before, statistics: header.statistics };
+        let (schedule, statistics) = (renderer.schedule(), header.statistics);
+        let run = Run { seconds, import_seconds, prepared, before, statistics, schedule };
         return print_json(&run.to_json(&gpu, &scene, &film, &settings));
     }
     Ok(())
@@ -301,6 +303,7 @@ struct Run {
     /// Of the film that was resumed.
     before: RenderStatistics,
     statistics: RenderStatistics,
+    schedule: Schedule,
 }
 
 impl Run {
@@ -313,6 +316,7 @@ impl Run {
             "adapter": info.name,
             "backend": info.backend.to_string(),
             "driver": format!("{} {}", info.driver, info.driver_info).trim(),
+            "schedule": self.schedule.name(),
             "scene": settings.get("scene"),
             "mode": settings.get("mode"),
             "gaze_trace": settings.get("gaze_trace"),

@@ -107,6 +107,8 @@ pub struct State {
     pub readout: Readout,
     /// The film's size, such as `4096x2048`.
     pub film: String,
+    /// How kernels share the work of a path.
+    pub schedule: &'static str,
     /// The mode of the last batch.
     pub mode: Option<Mode>,
     /// Samples of the film that were taken over from a file or a lost device.
@@ -428,7 +430,7 @@ impl Worker {
         (state.picture, state.is_sketch) = (Some(picture), false);
         state.version = version.unwrap_or_default();
         state.readout = readout;
-        state.film = film;
+        (state.film, state.schedule) = (film, self.tracing.schedule());
         state.mode = Some(look.controls.mode);
         drop(state);
         match self.untold.take() {

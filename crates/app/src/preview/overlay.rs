@@ -120,6 +120,8 @@ pub struct Facts<'a> {
     pub adapter: &'a str,
     /// `4096x2048`.
     pub film: &'a str,
+    /// How kernels share the work of a path.
+    pub schedule: &'a str,
     /// Names of the file's cameras.
     pub cameras: &'a [String],
     /// The camera last jumped to.
@@ -380,7 +382,7 @@ fn sampling(ui: &mut Ui, facts: &Facts<'_>, controls: &mut Controls, visibility:
         ui.label(format!("{:.4} deg", facts.deg_per_px));
         ui.end_row();
     });
-    ui.label(RichText::new(format!("Film {}", facts.film)).small().weak());
+    ui.label(RichText::new(format!("Film {}, {}", facts.film, facts.schedule)).small().weak());
     ui.add(egui::Label::new(RichText::new(facts.adapter).small().weak()).truncate());
 }
 

@@ -123,6 +123,7 @@ impl Screenshot {
             "shown_s": self.since.map_or(0.0, |since| (now - since).as_secs_f64()),
             "frames": self.frames.figures(),
             "film": state.film,
+            "schedule": state.schedule,
             "mode": state.mode.map(mode_name),
             "headset": state.headset.as_ref().map(|headset| json!({
                 "runtime": headset.runtime,

@@ -150,6 +150,7 @@ impl Tracing {
         let open = self.open.as_mut().context("no scene is open")?;
         let everywhere = Distribution::omnidirectional(inverse);
         let mut renderer = Renderer::new(&self.gpu, &film.header.renderer_options(), everywhere)?;
+        renderer.set_schedule(self.args.sampling.schedule.on(&self.gpu))?;
         self.scene_report = Some(timed_set_scene(&mut renderer, &open.scene)?);
         renderer.set_pose(film.header.pose);
         renderer.restore(film)?;
@@ -179,6 +180,12 @@ impl Tracing {
     pub fn film_size(&self) -> Option<[u32; 2]> {
         let plan = self.open.as_ref()?.plan?;
         Some([plan.options.width, plan.options.height])
+    }
+
+    /// How kernels share the work of a path; empty before there is a film.
+    pub fn schedule(&self) -> &'static str {
+        let renderer = self.open.as_ref().and_then(|open| open.renderer.as_ref());
+        renderer.map_or("", |renderer| renderer.schedule().name())
     }
 
     /// Bytes of the film on the device; 0 before there is one.
@@ -243,6 +250,7 @@ impl Tracing {
                     }
                     _ => Renderer::new(&self.gpu, &renderer_options(&self.args, plan), distribution)?,
                 };
+                renderer.set_schedule(self.args.sampling.schedule.on(&self.gpu))?;
                 self.scene_report = Some(timed_set_scene(&mut renderer, &open.scene)?);
                 open.renderer = Some(renderer);
             }

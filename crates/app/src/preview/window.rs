@@ -240,6 +240,7 @@ impl Window {
                 contents: &scene.contents,
                 adapter: &self.adapter,
                 film: &state.film,
+                schedule: state.schedule,
                 cameras: &cameras,
                 camera: self.camera,
                 notes: &scene.notes,

@@ -232,7 +232,7 @@ impl Worker {
         let mut state = lock(&self.shared.state);
         state.picture = Some(picture);
         state.readout = figures;
-        state.film = film;
+        (state.film, state.schedule) = (film, self.tracing.schedule());
         state.mode = Some(look.controls.mode);
         state.headset = Some(readout);
         drop(state);
