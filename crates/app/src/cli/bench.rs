@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
+use super::choices::ScheduleChoice;
 use super::study::StudyScene;
 use super::values::{Rgb, SizePx};
 
@@ -55,6 +56,9 @@ pub struct BenchArgs {
         value_parser = clap::value_parser!(u32).range(0..=4096), value_name = "N"
     )]
     pub max_bounces: u32,
+    /// How kernels share the work of a path; the part `modes` measures the other one beside it
+    #[arg(long, value_enum, default_value_t = ScheduleChoice::Auto, value_name = "SCHEDULE")]
+    pub schedule: ScheduleChoice,
     /// Radiance from everywhere outside the scene, linear
     #[arg(long, value_name = "R,G,B")]
     pub background: Option<Rgb>,

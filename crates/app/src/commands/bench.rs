@@ -26,6 +26,7 @@ mod goals;
 mod modes;
 mod page;
 mod rays;
+mod schedules;
 mod start;
 mod subject;
 

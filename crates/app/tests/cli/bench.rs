@@ -60,7 +60,11 @@ fn the_built_in_scene_is_measured_part_by_part() {
         for pass in ["generate_s", "trace_s", "accumulate_s", "reconstruct_s", "wall_s"] {
             assert!(all_positive(&batch[pass], 2), "{pass}: {batch}");
         }
+        for pass in ["other_trace_s", "other_wall_s", "start_s", "extend_s", "shade_s"] {
+            assert!(all_positive(&batch[pass], 2), "{pass}: {batch}");
+        }
     }
+    assert_ne!(scene["modes"]["schedule"], scene["modes"]["other_schedule"]);
     let [geometry, scene_bytes, triangles] =
         ["geometry_bytes", "scene_bytes", "triangles"].map(|key| scene["modes"][key].as_u64().unwrap());
     assert!(geometry > triangles * 36 && geometry < scene_bytes);

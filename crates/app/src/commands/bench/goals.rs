@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::page::{Found, batch_secs, batches, middle, per_second, ratio, row, rows, scenes, table};
 use super::rays::KINDS;
+use super::schedules;
 use crate::cli::bench::Part;
 use crate::commands::study::statistics::geometric_mean;
 
@@ -49,6 +50,17 @@ pub fn text(raw: &Value) -> String {
         let found = ratios.iter().map(|(ratio, name)| format!("{name} {ratio:.2}")).collect::<Vec<_>>().join(", ");
         let is_met = ratios.iter().all(|(ratio, _)| *ratio >= SEGMENTS);
         line("segments/s of FV over OD, mean over the gazes: at least 0.95", found, is_met);
+        let others: Vec<(f64, &str)> =
+            modes.iter().filter_map(|(name, found)| Some((schedules::mean_ratio(found)?, *name))).collect();
+        if !others.is_empty() {
+            let found = others.iter().map(|(ratio, name)| format!("{name} {ratio:.2}")).collect::<Vec<_>>().join(", ");
+            let is_met = others.iter().all(|(ratio, _)| *ratio <= 1.0);
+            line(
+                "rate of the other schedule over the one that is used, mean over modes and gazes: at most 1",
+                found,
+                is_met,
+            );
+        }
     }
     let edits = scenes(raw, Part::Edits);
     for (name, found) in edits.iter().filter(|(name, _)| *name == SPONZA) {

@@ -7,9 +7,12 @@ use fovea_sampler::report::{Chart, Mark};
 use serde_json::Value;
 
 use super::goals;
+use super::modes::MODES;
 use super::rays::KINDS;
+use super::schedules;
 use super::write as write_file;
 use crate::cli::bench::Part;
+use crate::commands::study::plan::Method;
 use crate::commands::study::plot::{self, Axis, Scale, Series};
 use crate::commands::study::statistics::{geometric_mean, median};
 
@@ -32,7 +35,7 @@ pub fn text(raw: &Value) -> String {
         text += &provenance(&scenes);
         text += &match part {
             Part::Rays => rays(&scenes),
-            Part::Modes => modes(&scenes) + &passes(&scenes) + &memory(&scenes),
+            Part::Modes => modes(&scenes) + &passes(&scenes) + &schedules::table_of(&scenes) + &memory(&scenes),
             Part::Edits => edits(&scenes),
             Part::Start => start(&scenes),
             Part::Features => features(&scenes),
@@ -108,7 +111,7 @@ pub(super) fn row(text: &mut String, cells: &[String]) {
 }
 
 /// `middle (least - most)`.
-fn spread(values: &[f64], digits: usize) -> String {
+pub(super) fn spread(values: &[f64], digits: usize) -> String {
     let known: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
     let (low, high) = known.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &v| (l.min(v), h.max(v)));
     match median(known) {
@@ -179,8 +182,6 @@ pub(super) fn per_second(batch: &Value, what: &str) -> f64 {
     number(&batch[what]) / batch_secs(batch)
 }
 
-const MODES: [&str; 3] = ["od", "vp", "fv"];
-
 fn modes(scenes: &Found<'_>) -> String {
     let mut text = table(&[
         "scene",
@@ -194,7 +195,7 @@ fn modes(scenes: &Found<'_>) -> String {
     ]);
     for (name, found) in scenes {
         let od = batches(found, "od");
-        for mode in MODES {
+        for mode in MODES.map(Method::name) {
             let here = batches(found, mode);
             let all = |what: &str| here.iter().map(|batch| per_second(batch, what) * 1e-3).collect::<Vec<_>>();
             let rays: Vec<f64> = all("segments").iter().zip(all("shadow_rays")).map(|(a, b)| a + b).collect();
@@ -225,8 +226,8 @@ fn modes(scenes: &Found<'_>) -> String {
 }
 
 fn passes(scenes: &Found<'_>) -> String {
-    let mut text = "\nPasses, milliseconds of the device, medians over the gazes. Tracing, shading and connecting are one kernel, \
-                    which generates its rays too; ray generation alone is a kernel of its own for this bench.\n\n"
+    let mut text = "\nPasses, milliseconds of the device, medians over the gazes. Tracing, shading and connecting are one figure, \
+                    which holds the generation of rays too; ray generation alone is a kernel of its own for this bench.\n\n"
         .to_owned();
     text += &table(&[
         "scene",
@@ -241,7 +242,7 @@ fn passes(scenes: &Found<'_>) -> String {
     ]);
     for (name, found) in scenes {
         let od = batches(found, "od");
-        for mode in MODES {
+        for mode in MODES.map(Method::name) {
             let here = batches(found, mode);
             let pass = |what: &str| here.iter().map(|batch| middle(&batch[what]) * 1e3).collect::<Vec<_>>();
             let share: Vec<f64> = here.iter().map(|b| middle(&b["generate_s"]) / batch_secs(b) * 100.0).collect();

@@ -8,6 +8,7 @@ use std::process::{Command, Stdio};
 use std::time::{Instant, SystemTime};
 
 use anyhow::{Context, ensure};
+use clap::ValueEnum;
 use serde_json::{Value, json};
 use tracer::gpu::{AdapterSelect, Gpu};
 use tracer::renderer::FIRST_BATCH;
@@ -108,6 +109,9 @@ fn words(args: &BenchArgs) -> Vec<OsString> {
     if let Some(background) = args.background {
         let [r, g, b] = background.0;
         option("--background", format!("{r},{g},{b}"));
+    }
+    if let Some(schedule) = args.schedule.to_possible_value() {
+        option("--schedule", schedule.get_name().to_owned());
     }
     if let Some(adapter) = &args.adapter {
         option("--adapter", adapter.clone());

@@ -91,6 +91,7 @@ impl Subject {
         if let Some(kind) = hierarchy {
             renderer.set_hierarchy(kind);
         }
+        renderer.set_schedule(args.schedule.on(gpu))?;
         let report = renderer.set_scene(scene)?;
         Ok((renderer, report))
     }
