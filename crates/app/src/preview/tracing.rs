@@ -27,7 +27,6 @@ use crate::tev::TevPicture;
 use crate::view::View;
 use compare::Side;
 use seeing::Seeing;
-pub use sketch::SKETCH_COARSENESS;
 
 mod compare;
 mod seeing;
@@ -36,6 +35,10 @@ mod sketch;
 /// Samples at which a pixel counts as much as what is around it and what was there before, while the picture moves. With 1 up to 2.2 %
 /// of a moving picture of the built-in scene were black, with 16 up to 0.22 %, with 32 none (`tests/films/moving.rs`).
 pub const SMOOTHING_WHILE_MOVING: f32 = 32.0;
+
+/// Pixels of the view for a texel, along each axis, of a picture that has to come soon where drawing is slow: a sketch on an adapter
+/// that computes on the CPU, and what moves.
+pub const COARSENESS: u32 = 2;
 
 /// Where a head looks.
 #[derive(Clone, Copy, Debug)]

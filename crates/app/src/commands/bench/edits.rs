@@ -13,9 +13,10 @@ use tracer::scene::Scene;
 use super::subject::{PICTURE_PX, Picture, Subject};
 use crate::cli::bench::BenchArgs;
 use crate::commands::study::plan::{FOVEA_DEG, Method, Place};
+use crate::preview::tracing::COARSENESS;
 
-/// Samples between an edit and the picture, clipped to the view as in the window.
-const SAMPLES: u32 = 1 << 13;
+/// Samples between an edit and the picture, in two batches, clipped to the view as in the window.
+const BATCHES: [u32; 2] = [1 << 13, 1 << 10];
 
 /// Seconds from each edit to a presented picture of samples traced after it, and how many of them are in the foveal disc.
 ///
@@ -25,9 +26,9 @@ pub fn measure(gpu: &Gpu, args: &BenchArgs, subject: &Subject) -> anyhow::Result
     let mut scene = (*subject.scene).clone();
     let (mut renderer, _) = subject.renderer(gpu, args, &scene)?;
     let place = subject.places.first().context("no gaze")?;
-    let picture = Picture::new(gpu, place, PICTURE_PX);
+    let picture = Picture::new(gpu, place, size_px(gpu));
     renderer.set_distribution(subject.distribution(Method::FvClip, place))?;
-    renderer.trace(SAMPLES)?;
+    trace(&mut renderer)?;
     picture.draw(&mut renderer)?;
 
     let mut shown = |edit: &dyn Fn(&mut Scene), times: u32| -> anyhow::Result<Vec<f64>> {
@@ -36,7 +37,7 @@ pub fn measure(gpu: &Gpu, args: &BenchArgs, subject: &Subject) -> anyhow::Result
             edit(&mut scene);
             let started = Instant::now();
             renderer.set_scene(&scene)?;
-            renderer.trace(SAMPLES)?;
+            trace(&mut renderer)?;
             picture.draw(&mut renderer)?;
             seconds.push(started.elapsed().as_secs_f64());
         }
@@ -58,9 +59,21 @@ pub fn measure(gpu: &Gpu, args: &BenchArgs, subject: &Subject) -> anyhow::Result
     let in_fovea = samples_in_fovea(&renderer, subject, place)?;
     let looks = looks_elsewhere(&mut renderer, gpu, args, subject)?;
     Ok(json!({
-        "samples": SAMPLES, "samples_in_foveal_disc": in_fovea,
+        "samples": BATCHES.iter().sum::<u32>(), "samples_in_foveal_disc": in_fovea,
         "material_s": material, "first_move_s": first_move, "move_s": moves, "gaze_s": looks,
     }))
+}
+
+/// As large as the window draws it while things change.
+fn size_px(gpu: &Gpu) -> [u32; 2] {
+    PICTURE_PX.map(|pixels| if gpu.is_software() { pixels / COARSENESS } else { pixels })
+}
+
+fn trace(renderer: &mut Renderer) -> anyhow::Result<()> {
+    for samples in BATCHES {
+        renderer.trace(samples)?;
+    }
+    Ok(())
 }
 
 /// Seconds from a gaze elsewhere to a picture with a batch of samples about it; the film goes on.
@@ -72,11 +85,11 @@ fn looks_elsewhere(
 ) -> anyhow::Result<Vec<f64>> {
     let mut seconds = Vec::new();
     for place in subject.places.iter().cycle().skip(1).take(args.rounds as usize) {
-        let picture = Picture::new(gpu, place, PICTURE_PX);
+        let picture = Picture::new(gpu, place, size_px(gpu));
         gpu.wait()?;
         let started = Instant::now();
         renderer.set_distribution(subject.distribution(Method::FvClip, place))?;
-        renderer.trace(SAMPLES)?;
+        trace(renderer)?;
         picture.draw(renderer)?;
         seconds.push(started.elapsed().as_secs_f64());
     }

@@ -16,7 +16,7 @@ use tracer::renderer::FIRST_BATCH;
 use super::subject::{PICTURE_PX, Picture, Subject};
 use crate::cli::bench::BenchArgs;
 use crate::commands::print_json;
-use crate::preview::tracing::SKETCH_COARSENESS;
+use crate::preview::tracing::COARSENESS;
 
 /// Shows the scene once: what the process that is timed does.
 ///
@@ -35,7 +35,7 @@ pub fn show(args: &BenchArgs) -> anyhow::Result<()> {
     let import = since();
     let place = subject.places.first().context("no gaze")?;
     let mut renderer = subject.empty_renderer(&gpu, args)?;
-    let coarseness = if gpu.is_software() { SKETCH_COARSENESS } else { 1 };
+    let coarseness = if gpu.is_software() { COARSENESS } else { 1 };
     Picture::new(&gpu, place, PICTURE_PX.map(|pixels| pixels / coarseness)).sketch(&mut renderer, &subject.scene)?;
     let sketch = since();
     let sketched_at = unix_secs()?;

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use glam::UVec2;
 
-use crate::preview::tracing::SMOOTHING_WHILE_MOVING;
+use crate::preview::tracing::{COARSENESS, SMOOTHING_WHILE_MOVING};
 
 /// How long after the last movement the picture is drawn in full again.
 const SETTLED: Duration = Duration::from_millis(250);
@@ -15,8 +15,6 @@ const SHARPENS: Duration = Duration::from_millis(2200);
 const ENOUGH: f64 = 0.5;
 /// A picture that takes longer than this is drawn coarser while it moves.
 const SMOOTH_ENOUGH: Duration = Duration::from_millis(30);
-/// Pixels a texel, along each axis, while it moves.
-const COARSE_WHILE_MOVING: u32 = 2;
 /// A picture that is smoother by this factor than it should be is drawn again, where nothing else asks for that.
 pub(super) const SEEN_SMOOTHER: f32 = 1.1;
 
@@ -41,7 +39,7 @@ impl Motion {
 
     /// Pixels a texel, along each axis, where drawing the picture in full takes so long.
     pub fn coarseness(&self, now: Instant, show_time: Duration) -> u32 {
-        if self.goes_on(now) && show_time > SMOOTH_ENOUGH { COARSE_WHILE_MOVING } else { 1 }
+        if self.goes_on(now) && show_time > SMOOTH_ENOUGH { COARSENESS } else { 1 }
     }
 
     /// As [`tracer::renderer::Renderer::set_smoothing`] has it, with so many samples in the film and a view of this size: 1 at

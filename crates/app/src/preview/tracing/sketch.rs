@@ -4,14 +4,10 @@ use anyhow::Context;
 use tracer::distribution::Distribution;
 use tracer::renderer::{FilmPose, Renderer};
 
-use super::{Tracing, renderer_options, view_settings};
+use super::{COARSENESS, Tracing, renderer_options, view_settings};
 use crate::film::FilmPlan;
 use crate::preview::engine::{Look, Picture};
 use crate::readback;
-
-/// Pixels of the view across and down for a texel of the sketch, on an adapter that computes on the CPU: there its rays are most of
-/// the time until it is seen.
-pub const SKETCH_COARSENESS: u32 = 2;
 
 impl Tracing {
     /// Draws a scene that was opened and is not traced yet, in the mean colours of its surfaces; `None` where there is none. What
@@ -21,7 +17,7 @@ impl Tracing {
             return Ok(None);
         }
         let inverse = self.inverse(look.controls.acuity)?;
-        let coarseness = if self.gpu.is_software() { SKETCH_COARSENESS } else { 1 };
+        let coarseness = if self.gpu.is_software() { COARSENESS } else { 1 };
         let size = self.picture_size(look, coarseness);
         let picture = self.target(size)?;
         let open = self.open.as_mut().context("no scene is open")?;
