@@ -28,7 +28,7 @@ fn sources() -> Arc<ShaderSources> {
 }
 
 fn key(kernel: Kernel, features: SceneFeatures, sources: &Arc<ShaderSources>) -> KernelKey {
-    let constants = KernelConstants { stack_size: 16, root_node: 3, environment_cells: [64, 32] };
+    let constants = KernelConstants { stack_size: 16, environment_cells: [64, 32] };
     KernelKey { kernel, features, constants, sources: sources.clone() }
 }
 

@@ -110,7 +110,18 @@ impl Gpu {
     /// When there is no adapter, none by that name, or it cannot run the tracer.
     pub fn headless(select: &AdapterSelect) -> Result<Self, GpuError> {
         let adapters = usable_adapters();
-        let adapter = Self::choose(&adapters, select)?.clone();
+        Self::open(Self::choose(&adapters, select)?.clone())
+    }
+
+    /// Another device of the same adapter.
+    ///
+    /// # Errors
+    /// When the adapter gives no more.
+    pub fn another(&self) -> Result<Self, GpuError> {
+        Ok(Self { geometry: self.geometry, ..Self::open(self.adapter.clone())? })
+    }
+
+    fn open(adapter: wgpu::Adapter) -> Result<Self, GpuError> {
         let info = adapter.get_info();
         let (required_features, required_limits) = Self::requirements(&adapter);
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {

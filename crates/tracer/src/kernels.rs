@@ -312,8 +312,6 @@ pub struct KernelKey {
 pub struct KernelConstants {
     /// Entries of the traversal stack: enough for the depth of the hierarchies.
     pub stack_size: u32,
-    /// Node that traversal starts at.
-    pub root_node: u32,
     /// Cells of the environment's importance grid.
     pub environment_cells: [u32; 2],
 }
@@ -442,7 +440,6 @@ fn constants_module(c: &KernelConstants) -> String {
         ("HISTOGRAM_WORDS", HISTOGRAM_WORDS as u32),
         ("HISTOGRAM_PIXELS_PER_THREAD", HISTOGRAM_PIXELS_PER_THREAD),
         ("STACK_SIZE", c.stack_size.max(1)),
-        ("ROOT_NODE", c.root_node),
         ("ENVIRONMENT_CELLS_X", c.environment_cells[0].max(1)),
         ("ENVIRONMENT_CELLS_Y", c.environment_cells[1].max(1)),
     ];

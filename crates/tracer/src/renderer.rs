@@ -13,6 +13,7 @@ mod inspect;
 mod options;
 mod panorama;
 mod query;
+mod rehearsal;
 mod restore;
 mod schedule;
 mod sketch;
@@ -26,6 +27,7 @@ pub use options::{
 };
 pub use panorama::Refreshed;
 pub use query::{Query, QueryAnswer, RayKind};
+pub use rehearsal::{Rehearsal, RehearsalError, Rehearsed};
 pub use restore::RestoreError;
 pub use schedule::Schedule;
 pub use timing::{BatchSeconds, StageSeconds};

@@ -44,6 +44,7 @@ mod sketch;
 use devices::Screen;
 pub use devices::{Devices, Picture};
 use motion::{Motion, SEEN_SMOOTHER};
+pub(super) use priority::give_way;
 use rate::Rate;
 pub use readout::{HeadsetReadout, Message, ShownVersion};
 
@@ -291,7 +292,7 @@ impl Worker {
     /// Until the window closes.
     fn run(mut self) {
         if self.devices.are_two() {
-            priority::give_way();
+            give_way();
         }
         loop {
             match self.next_request() {
@@ -363,6 +364,7 @@ impl Worker {
         let rests = look.controls.paused || self.tracing.elapsed() > GUIDES_AFTER;
         if rests && !self.motion.goes_on(Instant::now()) {
             self.tracing.find_guides(look)?;
+            self.tracing.rehearse();
         }
         Ok(())
     }

@@ -26,9 +26,11 @@ use crate::settings::RunSettings;
 use crate::tev::TevPicture;
 use crate::view::View;
 use compare::Side;
+use rehearsal::Rehearsals;
 use seeing::Seeing;
 
 mod compare;
+mod rehearsal;
 mod seeing;
 mod sketch;
 
@@ -96,6 +98,7 @@ pub struct Tracing {
     seeing: Seeing,
     /// What the last version of the scene took, and how long altogether.
     scene_report: Option<(SceneReport, Duration)>,
+    rehearsals: Rehearsals,
 }
 
 impl Tracing {
@@ -117,6 +120,7 @@ impl Tracing {
             beside: None,
             seeing: Seeing::default(),
             scene_report: None,
+            rehearsals: Rehearsals::default(),
         }
     }
 

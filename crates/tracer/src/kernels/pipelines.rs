@@ -45,7 +45,11 @@ enum PipelineKind {
 }
 
 impl Pipeline {
-    fn create(
+    /// Compiles a kernel, for targets of a format where it draws.
+    ///
+    /// # Errors
+    /// When it does not compose or compile.
+    pub fn create(
         device: &wgpu::Device,
         key: &KernelKey,
         target: Option<wgpu::TextureFormat>,
@@ -323,12 +327,22 @@ impl PipelineCache {
             return Ok(pipeline.clone());
         }
         let pipeline = Arc::new(Pipeline::create(device, &key.0, target)?);
+        self.keep(key, pipeline.clone());
+        Ok(pipeline)
+    }
+
+    /// Takes in a compute kernel's pipeline that was made elsewhere.
+    pub fn take_in(&mut self, key: KernelKey, pipeline: Arc<Pipeline>) {
+        self.asked += 1;
+        self.keep((key, None), pipeline);
+    }
+
+    fn keep(&mut self, key: CacheKey, pipeline: Arc<Pipeline>) {
         if self.known.len() >= MOST_KEPT
             && let Some(oldest) = self.known.iter().min_by_key(|(_, (_, last))| *last).map(|(key, _)| key.clone())
         {
             self.known.remove(&oldest);
         }
-        self.known.insert(key, (pipeline.clone(), self.asked));
-        Ok(pipeline)
+        self.known.insert(key, (pipeline, self.asked));
     }
 }

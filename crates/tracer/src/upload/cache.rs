@@ -31,7 +31,6 @@ const MOST_LOOSE: usize = 64;
 pub(super) struct ShapesOnGpu {
     /// Without nodes and positions, which nothing on the host needs any more.
     pub shapes: Shapes,
-    pub node_count: u32,
     pub tables: Tables,
     bytes: u64,
 }
@@ -49,7 +48,7 @@ struct Seen {
 pub struct SceneCache {
     hierarchy: HierarchyKind,
     blas: BlasCache,
-    shapes: Option<(ContentHash, Arc<ShapesOnGpu>)>,
+    shapes: Option<Arc<ShapesOnGpu>>,
     texels: Option<(ContentHash, Arc<TexelHeap>)>,
     environment: Option<(Option<ContentHash>, Arc<EnvironmentOnGpu>)>,
     lobe_tables: Option<([bool; 3], wgpu::TextureView, u64)>,
@@ -99,24 +98,47 @@ impl SceneCache {
         split: &Split,
         uploader: &mut Uploader<'_>,
     ) -> Result<Arc<ShapesOnGpu>, UploadError> {
-        let hash = split.shapes_hash(scene);
-        if let Some((known, shapes)) = &self.shapes
-            && *known == hash
-        {
-            uploader.count(shapes.bytes, false);
-            return Ok(shapes.clone());
+        // Not both on the device at once, where they are built anew.
+        let last = self.shapes.take().and_then(Arc::into_inner);
+        let grown = match last {
+            Some(last) => self.grown_shapes(last, scene, split, uploader)?,
+            None => None,
+        };
+        let shapes = match grown {
+            Some(grown) => grown,
+            None => {
+                let mut shapes = Shapes::build(scene, split, self.hierarchy, &mut self.blas);
+                let before = uploader.device_bytes;
+                let tables = Tables::upload(&shapes, split.entries(), uploader)?;
+                (shapes.nodes, shapes.positions) = (Vec::new(), Vec::new());
+                ShapesOnGpu { shapes, tables, bytes: uploader.device_bytes - before }
+            }
+        };
+        let shapes = Arc::new(shapes);
+        self.shapes = Some(shapes.clone());
+        Ok(shapes)
+    }
+
+    /// Those of the last version, where this one's follow from them.
+    fn grown_shapes(
+        &mut self,
+        last: ShapesOnGpu,
+        scene: &Scene,
+        split: &Split,
+        uploader: &mut Uploader<'_>,
+    ) -> Result<Option<ShapesOnGpu>, UploadError> {
+        let ShapesOnGpu { mut shapes, tables, bytes } = last;
+        let Some(growth) = shapes.grow(scene, split, self.hierarchy, &mut self.blas) else { return Ok(None) };
+        if shapes.nodes.is_empty() && growth.gone.is_empty() {
+            uploader.count(bytes, false);
+            return Ok(Some(ShapesOnGpu { shapes, tables, bytes }));
         }
-        // Not both on the device at once.
-        self.shapes = None;
-        let mut shapes = Shapes::build(scene, split, self.hierarchy, &mut self.blas);
         let before = uploader.device_bytes;
-        let tables = Tables::upload(&shapes, split.first_part() as usize, uploader)?;
-        let bytes = uploader.device_bytes - before;
-        let node_count = shapes.nodes.len() as u32;
+        let Some(tables) = tables.grown(&shapes, &growth, split.entries(), uploader)? else { return Ok(None) };
         (shapes.nodes, shapes.positions) = (Vec::new(), Vec::new());
-        let on_gpu = Arc::new(ShapesOnGpu { shapes, node_count, tables, bytes });
-        self.shapes = Some((hash, on_gpu.clone()));
-        Ok(on_gpu)
+        let bytes = tables.bytes();
+        uploader.count(bytes.saturating_sub(uploader.device_bytes - before), false);
+        Ok(Some(ShapesOnGpu { shapes, tables, bytes }))
     }
 
     pub(super) fn texels(&mut self, scene: &Scene, uploader: &mut Uploader<'_>) -> Result<Arc<TexelHeap>, UploadError> {

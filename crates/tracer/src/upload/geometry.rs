@@ -3,8 +3,9 @@
 //! A mesh that is placed once, or is small, becomes part of one *static* mesh in world space. Two-level hierarchies over
 //! the interleaved, building-sized meshes of real scenes cost 2 to 4 times the traversal (docs/ARCHITECTURE.md).
 //! Meshes that are placed often, and instances that were moved, keep a hierarchy of their own, and the upper level places them.
+//! What leaves the static mesh leaves degenerate triangles behind, which nothing hits: the hierarchy stays as it is.
 
-use std::{collections::HashMap, sync::Arc};
+use std::{collections::HashMap, ops::Range, sync::Arc};
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -32,8 +33,9 @@ pub(super) struct Split {
     meshes: Vec<u32>,
 }
 
-/// A run of the scene that has one hierarchy: the static mesh, or a mesh that is placed often.
+/// A run of the scene that has one hierarchy: the static mesh, or a mesh that is placed.
 struct Piece {
+    /// Of what the hierarchy is built from.
     hash: ContentHash,
     positions: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
@@ -48,20 +50,47 @@ pub(super) struct PlacedBlas {
     /// Its root in the buffer of nodes.
     pub root: u32,
     pub blas: Arc<Blas>,
-    triangles: std::ops::Range<u32>,
+    triangles: Range<u32>,
+}
+
+/// An instance's part of the static mesh.
+#[derive(Debug)]
+pub(super) struct Part {
+    pub source: u32,
+    /// Of the mesh, its place, and whether light passes.
+    hash: ContentHash,
+    /// Its triangles are degenerate: the instance is placed by itself, or hidden.
+    pub is_gone: bool,
 }
 
 /// Shapes in the kernels' layout.
 #[derive(Debug)]
 pub(super) struct Shapes {
+    /// The last so many of [`Shapes::node_count`]: those that are not on the device yet.
     pub nodes: Vec<Node>,
-    /// Nine coordinates a triangle, in leaf order.
+    /// Nine coordinates a triangle, in leaf order; of the last triangles, as for the nodes.
     pub positions: Vec<[f32; 9]>,
     /// Per triangle: its three vertices, and its number in its mesh with [`codes::TRIANGLE_ALPHA`].
     pub triangles: Vec<[u32; 4]>,
     pub vertices: Vec<layout::Vertex>,
-    /// Of each placed mesh in ascending order, then of the static mesh if there is one; so their roots ascend too.
-    pub pieces: Vec<PlacedBlas>,
+    /// Traversal starts at the first: a copy of the static mesh's root, which gives way to that of an upper level.
+    pub node_count: u32,
+    pub static_mesh: Option<PlacedBlas>,
+    /// Of the static mesh; each has the entry of its number in the instance table.
+    pub parts: Vec<Part>,
+    /// Of the placed meshes, their roots ascending.
+    placed: Vec<PlacedBlas>,
+    /// Which of them, by [`placed_hash`].
+    by_hash: HashMap<ContentHash, usize>,
+}
+
+/// Rows of the tables that shapes had before they grew, and what has left the static mesh.
+pub(super) struct Growth {
+    pub nodes: u32,
+    pub triangles: usize,
+    pub vertices: usize,
+    /// Runs of triangles that have become degenerate.
+    pub gone: Vec<Range<u32>>,
 }
 
 impl Split {
@@ -83,69 +112,147 @@ impl Split {
         Self { fixed, placed, meshes }
     }
 
-    /// Entries of the instance table before the static mesh's parts.
-    pub(super) fn first_part(&self) -> u32 {
-        (self.placed.len() + usize::from(!self.fixed.is_empty())) as u32
+    /// Entries of the upper level, at most.
+    pub(super) fn entries(&self) -> usize {
+        self.placed.len() + usize::from(!self.fixed.is_empty())
     }
 
-    /// What the shapes depend on. The places of the placed ones do not count.
-    pub(super) fn shapes_hash(&self, scene: &Scene) -> ContentHash {
-        let mut bytes = self.first_part().to_le_bytes().to_vec();
-        for &i in &self.fixed {
-            let instance = &scene.instances[i as usize];
-            bytes.extend(scene.meshes[instance.mesh as usize].hash.0.to_le_bytes());
-            bytes.extend(bytemuck::cast_slice(&instance.world_from_mesh.to_cols_array()));
-            bytes.push(u8::from(passes_light(scene, instance)));
-        }
-        bytes.extend(b"placed");
-        let passing = meshes_passing_light(scene);
-        for &mesh in &self.meshes {
-            bytes.extend(scene.meshes[mesh as usize].hash.0.to_le_bytes());
-            bytes.push(u8::from(passing[mesh as usize]));
-        }
-        ContentHash::of(&[&bytes])
-    }
-
-    /// Index of the piece of a mesh that is placed.
-    pub(super) fn piece_of(&self, mesh: u32) -> Option<usize> {
-        self.meshes.binary_search(&mesh).ok()
+    /// The static mesh's parts, were it built of this.
+    fn parts(&self, scene: &Scene) -> Vec<Part> {
+        let part = |&source: &u32| {
+            let instance = &scene.instances[source as usize];
+            let matrix = instance.world_from_mesh.to_cols_array();
+            let mesh = scene.meshes[instance.mesh as usize].hash.mix(bytemuck::cast_slice(&matrix));
+            Part { source, hash: mesh.mix(&[u8::from(passes_light(scene, instance))]), is_gone: false }
+        };
+        self.fixed.iter().map(part).collect()
     }
 }
 
 impl Shapes {
     pub(super) fn build(scene: &Scene, split: &Split, kind: HierarchyKind, cache: &mut BlasCache) -> Self {
-        let passing = meshes_passing_light(scene);
-        let own = split.meshes.par_iter().map(|&m| own_piece(&scene.meshes[m as usize], passing[m as usize]));
-        let mut pieces: Vec<Piece> = own.collect();
-        if !split.fixed.is_empty() {
-            pieces.push(static_piece(scene, &split.fixed, split.first_part()));
-        }
-        let blas = build_hierarchies(&pieces, kind, cache);
         let mut shapes = Self {
-            nodes: Vec::with_capacity(blas.iter().map(|b| b.nodes.len()).sum()),
-            positions: Vec::with_capacity(blas.iter().map(|b| b.triangle_order.len()).sum()),
-            triangles: Vec::with_capacity(blas.iter().map(|b| b.triangle_order.len()).sum()),
-            vertices: Vec::with_capacity(pieces.iter().map(|p| p.vertices.len()).sum()),
-            pieces: Vec::with_capacity(pieces.len()),
+            nodes: vec![Node::default()],
+            positions: Vec::new(),
+            triangles: Vec::new(),
+            vertices: Vec::new(),
+            node_count: 1,
+            static_mesh: None,
+            parts: split.parts(scene),
+            placed: Vec::new(),
+            by_hash: HashMap::new(),
         };
-        for (piece, blas) in pieces.iter().zip(blas) {
-            shapes.push_piece(piece, blas);
+        let (hashes, mut pieces) = shapes.missing_pieces(scene, split);
+        let has_static = !split.fixed.is_empty();
+        if has_static {
+            pieces.push(static_piece(scene, &split.fixed));
         }
+        let mut blas = build_hierarchies(&pieces, kind, cache);
+        *cache = pieces.iter().zip(&blas).map(|(piece, blas)| (piece.hash, blas.clone())).collect();
+        shapes.reserve(&pieces, &blas);
+        if has_static && let (Some(piece), Some(blas)) = (pieces.last(), blas.pop()) {
+            shapes.static_mesh = Some(shapes.push_piece(piece, blas));
+            shapes.nodes[0] = shapes.nodes[1];
+        }
+        shapes.push_placed(hashes, &pieces, blas);
         shapes
+    }
+
+    /// Follows to another version of the scene by adding the meshes that are placed now and marking what has left the static mesh.
+    /// `None`, with nothing changed, where that does not do: something joins the static mesh, or most of it has left.
+    pub(super) fn grow(
+        &mut self,
+        scene: &Scene,
+        split: &Split,
+        kind: HierarchyKind,
+        cache: &mut BlasCache,
+    ) -> Option<Growth> {
+        let staying = split.parts(scene);
+        let mut left = staying.iter().peekable();
+        let goes: Vec<bool> = self
+            .parts
+            .iter()
+            .map(|part| left.next_if(|stays| stays.source == part.source && stays.hash == part.hash && !part.is_gone))
+            .map(|stays| stays.is_none())
+            .collect();
+        if left.peek().is_some() {
+            return None;
+        }
+        let all = self.static_mesh.as_ref().map_or(0..0, |piece| piece.triangles.clone());
+        let goes_with = |slot: u32| {
+            let [first, ..] = self.triangles[slot as usize];
+            goes[self.vertices[first as usize].part as usize]
+        };
+        let gone = if self.parts.iter().zip(&goes).any(|(part, goes)| *goes && !part.is_gone) {
+            runs(all.clone(), goes_with)
+        } else {
+            Vec::new()
+        };
+        if gone.iter().map(|run| run.len()).sum::<usize>() > all.len() / 2 {
+            return None;
+        }
+        let growth =
+            Growth { nodes: self.node_count, triangles: self.triangles.len(), vertices: self.vertices.len(), gone };
+        for (part, goes) in self.parts.iter_mut().zip(goes) {
+            part.is_gone = goes;
+        }
+        let (hashes, pieces) = self.missing_pieces(scene, split);
+        let blas = build_hierarchies(&pieces, kind, cache);
+        cache.extend(pieces.iter().zip(&blas).map(|(piece, blas)| (piece.hash, blas.clone())));
+        self.push_placed(hashes, &pieces, blas);
+        Some(growth)
+    }
+
+    /// The hierarchy of a mesh that is placed.
+    pub(super) fn placed(&self, hash: ContentHash) -> Option<&PlacedBlas> {
+        self.by_hash.get(&hash).and_then(|&piece| self.placed.get(piece))
+    }
+
+    /// Levels of the deepest hierarchy.
+    pub(super) fn depth(&self) -> u32 {
+        self.placed.iter().chain(&self.static_mesh).map(|piece| piece.blas.depth).max().unwrap_or(1)
+    }
+
+    /// Of placed meshes that have none here: what they are known by, and pieces.
+    fn missing_pieces(&self, scene: &Scene, split: &Split) -> (Vec<ContentHash>, Vec<Piece>) {
+        let passing = meshes_passing_light(scene);
+        let mut missing: Vec<(ContentHash, u32)> =
+            split.meshes.iter().map(|&mesh| (placed_hash(scene, mesh, &passing), mesh)).collect();
+        missing.retain(|(hash, _)| self.placed(*hash).is_none());
+        let piece_of = |&(_, mesh): &(_, u32)| own_piece(&scene.meshes[mesh as usize], passing[mesh as usize]);
+        let pieces = missing.par_iter().map(piece_of).collect();
+        (missing.into_iter().map(|(hash, _)| hash).collect(), pieces)
     }
 
     /// Number in its mesh and slot of every triangle of the piece whose root node this is.
     pub(super) fn slots_below(&self, root: u32) -> impl Iterator<Item = (u32, u32)> + '_ {
-        let piece = self.pieces.binary_search_by_key(&root, |piece| piece.root);
-        let range = piece.map_or(0..0, |piece| self.pieces[piece].triangles.clone());
+        let piece = self.placed.binary_search_by_key(&root, |piece| piece.root);
+        let range = piece.map_or(0..0, |piece| self.placed[piece].triangles.clone());
         range.map(|slot| (self.triangles[slot as usize][3] & !codes::TRIANGLE_ALPHA, slot))
     }
 
+    fn reserve(&mut self, pieces: &[Piece], blas: &[Arc<Blas>]) {
+        let triangles = blas.iter().map(|b| b.triangle_order.len()).sum();
+        self.nodes.reserve(blas.iter().map(|b| b.nodes.len()).sum());
+        self.positions.reserve(triangles);
+        self.triangles.reserve(triangles);
+        self.vertices.reserve(pieces.iter().map(|p| p.vertices.len()).sum());
+    }
+
+    fn push_placed(&mut self, hashes: Vec<ContentHash>, pieces: &[Piece], blas: Vec<Arc<Blas>>) {
+        for ((hash, piece), blas) in hashes.into_iter().zip(pieces).zip(blas) {
+            let placed = self.push_piece(piece, blas);
+            self.by_hash.insert(hash, self.placed.len());
+            self.placed.push(placed);
+        }
+    }
+
     /// Appends a piece in the leaf order of its hierarchy.
-    fn push_piece(&mut self, piece: &Piece, blas: Arc<Blas>) {
-        let root = self.nodes.len() as u32;
+    fn push_piece(&mut self, piece: &Piece, blas: Arc<Blas>) -> PlacedBlas {
+        let root = self.node_count;
         let first_vertex = self.vertices.len() as u32;
         self.nodes.extend(rebased(blas.kind, &blas.nodes, root, self.triangles.len() as u32));
+        self.node_count += blas.nodes.len() as u32;
         for &t in &blas.triangle_order {
             let corners = piece.triangles[t as usize];
             let mut flat = [0.0; 9];
@@ -159,18 +266,31 @@ impl Shapes {
         self.vertices.extend_from_slice(&piece.vertices);
         let end = self.triangles.len() as u32;
         let triangles = end - blas.triangle_order.len() as u32..end;
-        self.pieces.push(PlacedBlas { root, blas, triangles });
+        PlacedBlas { root, blas, triangles }
     }
 }
 
-/// The pieces' hierarchies; builds those that are new on all cores and forgets unused ones.
-fn build_hierarchies(pieces: &[Piece], kind: HierarchyKind, cache: &mut BlasCache) -> Vec<Arc<Blas>> {
-    let known = &*cache;
+/// Maximal runs of what `belongs`.
+fn runs(within: Range<u32>, belongs: impl Fn(u32) -> bool) -> Vec<Range<u32>> {
+    let mut runs: Vec<Range<u32>> = Vec::new();
+    for slot in within.filter(|&slot| belongs(slot)) {
+        match runs.last_mut() {
+            Some(run) if run.end == slot => run.end += 1,
+            _ => runs.push(slot..slot + 1),
+        }
+    }
+    runs
+}
+
+/// The pieces' hierarchies; builds those that are new on all cores.
+fn build_hierarchies(pieces: &[Piece], kind: HierarchyKind, known: &BlasCache) -> Vec<Arc<Blas>> {
     let build = |p: &Piece| Arc::new(Blas::build(kind, &p.positions, &p.triangles));
-    let blas: Vec<Arc<Blas>> =
-        pieces.par_iter().map(|p| known.get(&p.hash).cloned().unwrap_or_else(|| build(p))).collect();
-    *cache = pieces.iter().zip(&blas).map(|(piece, blas)| (piece.hash, blas.clone())).collect();
-    blas
+    pieces.par_iter().map(|p| known.get(&p.hash).cloned().unwrap_or_else(|| build(p))).collect()
+}
+
+/// What the shape of a placed mesh depends on.
+pub(super) fn placed_hash(scene: &Scene, mesh: u32, passing: &[bool]) -> ContentHash {
+    scene.meshes[mesh as usize].hash.mix(&[u8::from(passing[mesh as usize])])
 }
 
 fn own_piece(mesh: &Mesh, passes_light: bool) -> Piece {
@@ -189,7 +309,7 @@ fn numbers(mesh: &Mesh, passes_light: bool) -> Vec<u32> {
 }
 
 /// For each mesh, whether some instance of it passes light.
-fn meshes_passing_light(scene: &Scene) -> Vec<bool> {
+pub(super) fn meshes_passing_light(scene: &Scene) -> Vec<bool> {
     let mut passing = vec![false; scene.meshes.len()];
     for instance in scene.instances.iter().filter(|i| passes_light(scene, i)) {
         passing[instance.mesh as usize] = true;
@@ -202,8 +322,8 @@ fn passes_light(scene: &Scene, instance: &Instance) -> bool {
     material.alpha_mode != AlphaMode::Opaque || material.is_clear_sheet()
 }
 
-/// All fixed instances in world space; their entries in the instance table follow the `first_part` others.
-fn static_piece(scene: &Scene, fixed: &[u32], first_part: u32) -> Piece {
+/// All fixed instances in world space; their entries in the instance table come first.
+fn static_piece(scene: &Scene, fixed: &[u32]) -> Piece {
     let parts: Vec<Piece> = fixed
         .par_iter()
         .enumerate()
@@ -221,7 +341,7 @@ fn static_piece(scene: &Scene, fixed: &[u32], first_part: u32) -> Piece {
                     .iter()
                     .map(|&[a, b, c]| if mirrored { [a, c, b] } else { [a, b, c] })
                     .collect(),
-                vertices: vertices::encode(mesh, Some(&instance.world_from_mesh), first_part + part as u32).collect(),
+                vertices: vertices::encode(mesh, Some(&instance.world_from_mesh), part as u32).collect(),
                 numbers: numbers(mesh, passes_light(scene, instance)),
             }
         })

@@ -60,41 +60,55 @@ impl Pages {
         u64::from(size.width) * u64::from(size.height) * u64::from(size.depth_or_array_layers) * self.texel_bytes
     }
 
-    /// Writes texels from the beginning of a row on; rows are numbered through all pages. What is left of the last row becomes zero.
-    pub(super) fn write<T: bytemuck::Pod>(&self, gpu: &Gpu, first_row: u32, texels: impl IntoIterator<Item = T>) {
+    /// Writes texels from the first on. What is left of the last row becomes zero.
+    pub(super) fn fill<T: bytemuck::Pod>(&self, gpu: &Gpu, texels: impl IntoIterator<Item = T>) {
         let mut rest = texels.into_iter();
-        let mut row = first_row;
+        let mut page = 0;
         let mut piece: Vec<T> = Vec::new();
         loop {
-            // To the page's end.
-            let (page, y) = (row / PAGE, row % PAGE);
-            let room = (PAGE - y) as usize * PAGE as usize;
             piece.clear();
-            piece.extend(rest.by_ref().take(room));
+            piece.extend(rest.by_ref().take((PAGE * PAGE) as usize));
             if piece.is_empty() {
                 return;
             }
             let rows = piece.len().div_ceil(PAGE as usize);
             piece.resize(rows * PAGE as usize, T::zeroed());
-            gpu.queue.write_texture(
-                wgpu::TexelCopyTextureInfo {
-                    texture: &self.texture,
-                    mip_level: 0,
-                    origin: wgpu::Origin3d { x: 0, y, z: page },
-                    aspect: wgpu::TextureAspect::All,
-                },
-                bytemuck::cast_slice(&piece),
-                wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(PAGE * size_of::<T>() as u32),
-                    rows_per_image: Some(rows as u32),
-                },
-                wgpu::Extent3d { width: PAGE, height: rows as u32, depth_or_array_layers: 1 },
-            );
+            self.write(gpu, wgpu::Origin3d { x: 0, y: 0, z: page }, [PAGE, rows as u32], &piece);
             // Writes are staged until the next submission: one page's worth at a time.
             gpu.queue.submit([]);
-            row += rows as u32;
+            page += 1;
         }
+    }
+
+    /// Writes texels from number `first` on, and leaves the others.
+    pub(super) fn put<T: bytemuck::Pod>(&self, gpu: &Gpu, first: usize, texels: &[T]) {
+        let page = PAGE as usize;
+        let (mut at, mut rest) = (first, texels);
+        while !rest.is_empty() {
+            let (piece, later) = rest.split_at(rest.len().min(page - at % page));
+            let row = at / page;
+            let origin = wgpu::Origin3d { x: (at % page) as u32, y: (row % page) as u32, z: (row / page) as u32 };
+            self.write(gpu, origin, [piece.len() as u32, 1], piece);
+            (at, rest) = (at + piece.len(), later);
+        }
+    }
+
+    fn write<T: bytemuck::Pod>(&self, gpu: &Gpu, origin: wgpu::Origin3d, [width, height]: [u32; 2], texels: &[T]) {
+        gpu.queue.write_texture(
+            wgpu::TexelCopyTextureInfo {
+                texture: &self.texture,
+                mip_level: 0,
+                origin,
+                aspect: wgpu::TextureAspect::All,
+            },
+            bytemuck::cast_slice(texels),
+            wgpu::TexelCopyBufferLayout {
+                offset: 0,
+                bytes_per_row: Some(width * size_of::<T>() as u32),
+                rows_per_image: Some(height),
+            },
+            wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        );
     }
 
     /// Begins with what another stack holds, which must be no larger.

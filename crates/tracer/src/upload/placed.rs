@@ -27,13 +27,8 @@ impl Placed {
     ) -> Result<Self, UploadError> {
         let split = cache.split(scene);
         let shapes = cache.shapes(scene, &split, uploader)?;
-        let upper_root = shapes.tables.upper_root(shapes.node_count);
-        let placement = Placement::of(scene, &split, cache.hierarchy(), &shapes.shapes, upper_root);
-        let tables = if placement.nodes.is_empty() {
-            shapes.tables.clone()
-        } else {
-            shapes.tables.with_upper_level(shapes.node_count, placement.root, &placement.nodes, uploader)?
-        };
+        let placement = Placement::of(scene, &split, cache.hierarchy(), &shapes.shapes);
+        let tables = shapes.tables.with_upper_level(shapes.shapes.node_count, &placement.nodes, uploader)?;
         Ok(Self { shapes, placement, tables })
     }
 
@@ -47,7 +42,6 @@ impl Placed {
 
     /// Numbers of the kernels.
     pub(super) fn constants(&self, environment_cells: [u32; 2]) -> KernelConstants {
-        let Placement { stack_size, root: root_node, .. } = self.placement;
-        KernelConstants { stack_size, root_node, environment_cells }
+        KernelConstants { stack_size: self.placement.stack_size, environment_cells }
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::{Affine3A, Mat3A};
 
-use super::geometry::{Shapes, Split};
+use super::geometry::{Shapes, Split, meshes_passing_light, placed_hash};
 use crate::{
     bvh::{HierarchyKind, Node, Tlas, TlasEntry, rebased},
     kernels::layout::{self, codes},
@@ -11,14 +11,12 @@ use crate::{
 
 /// Instances in the kernels' layout.
 pub(super) struct Placement {
-    /// Of the upper level; they stand behind the shapes' nodes, from `root` on.
+    /// Of the upper level; they stand behind the shapes' nodes.
     pub nodes: Vec<Node>,
-    /// Entries of the upper level in leaf order, room for the hidden ones, then the parts of the static mesh.
+    /// The parts of the static mesh, then the entries of the upper level in leaf order.
     pub instances: Vec<layout::Instance>,
-    /// Scene instance of each entry; `None` for the static mesh as a whole and for hidden ones.
+    /// Scene instance of each entry; `None` for the static mesh as a whole and for what has left it.
     pub sources: Vec<Option<u32>>,
-    /// Node that traversal starts at: of the upper level, or of the only hierarchy when nothing is placed.
-    pub root: u32,
     /// Nothing is placed: there is one level only.
     pub is_single_level: bool,
     /// Entries that the traversal stack needs.
@@ -26,51 +24,46 @@ pub(super) struct Placement {
 }
 
 impl Placement {
-    pub(super) fn of(scene: &Scene, split: &Split, kind: HierarchyKind, shapes: &Shapes, upper_root: u32) -> Self {
+    pub(super) fn of(scene: &Scene, split: &Split, kind: HierarchyKind, shapes: &Shapes) -> Self {
+        let passing = meshes_passing_light(scene);
         let visible = split.placed.iter().copied().filter(|&i| scene.instances[i as usize].visible);
         let mut roots = Vec::new();
         let mut entries = Vec::new();
         for source in visible {
             let instance = &scene.instances[source as usize];
-            let Some(piece) = split.piece_of(instance.mesh).and_then(|piece| shapes.pieces.get(piece)) else {
-                continue;
-            };
+            let Some(piece) = shapes.placed(placed_hash(scene, instance.mesh, &passing)) else { continue };
             roots.push(piece.root);
             let world_from_mesh = instance.world_from_mesh;
             entries.push(TlasEntry { world_from_mesh, blas: piece.blas.clone(), source: Some(source) });
         }
-        if let (false, Some(piece)) = (split.fixed.is_empty(), shapes.pieces.last()) {
+        if let (false, Some(piece)) = (split.fixed.is_empty(), &shapes.static_mesh) {
             roots.push(piece.root);
             entries.push(TlasEntry { world_from_mesh: Affine3A::IDENTITY, blas: piece.blas.clone(), source: None });
         }
         let tlas = Tlas::build(kind, &entries);
-        let deepest = shapes.pieces.iter().map(|piece| piece.blas.depth).max().unwrap_or(1);
         let is_single_level = split.placed.is_empty() && !split.fixed.is_empty();
+        // Each level leaves at most one group behind, and entering a mesh leaves two.
+        let groups = if is_single_level { shapes.depth() } else { tlas.depth + shapes.depth() + 2 };
         let mut placement = Self {
             nodes: Vec::new(),
-            instances: Vec::with_capacity(split.first_part() as usize + split.fixed.len()),
+            instances: Vec::with_capacity(shapes.parts.len() + entries.len()),
             sources: Vec::new(),
-            root: 0,
             is_single_level,
-            stack_size: deepest.next_multiple_of(4),
+            stack_size: groups.next_multiple_of(4),
         };
+        for part in &shapes.parts {
+            let source = (!part.is_gone).then_some(part.source);
+            let instance = source.map(|source| &scene.instances[source as usize]);
+            placement.push(instance, &Affine3A::IDENTITY, codes::NONE, source);
+        }
+        if is_single_level {
+            return placement;
+        }
+        placement.nodes = rebased(kind, &tlas.nodes, shapes.node_count, shapes.parts.len() as u32).collect();
         for &order in &tlas.order {
             let entry = &entries[order as usize];
             let instance = entry.source.map(|source| &scene.instances[source as usize]);
             placement.push(instance, &entry.world_from_mesh, roots[order as usize], entry.source);
-        }
-        while placement.instances.len() < split.first_part() as usize {
-            placement.push(None, &Affine3A::IDENTITY, codes::NONE, None);
-        }
-        for &source in &split.fixed {
-            let instance = &scene.instances[source as usize];
-            placement.push(Some(instance), &Affine3A::IDENTITY, codes::NONE, Some(source));
-        }
-        if !is_single_level {
-            placement.root = upper_root;
-            placement.nodes = rebased(kind, &tlas.nodes, placement.root, 0).collect();
-            // Each level leaves at most one group behind, and entering a mesh leaves two.
-            placement.stack_size = (tlas.depth + deepest + 2).next_multiple_of(4);
         }
         placement
     }
@@ -79,11 +72,6 @@ impl Placement {
         self.instances.push(encode_instance(instance, world_from_mesh, root_node));
         self.sources.push(source);
     }
-}
-
-/// To an eighth of its own size at most: the root is a constant of the kernels, and a shape more or less must not compile others.
-pub(super) fn rounded_up(nodes: u32) -> u32 {
-    nodes.next_multiple_of((nodes / 16).next_power_of_two())
 }
 
 fn encode_instance(instance: Option<&Instance>, world_from_mesh: &Affine3A, root_node: u32) -> layout::Instance {

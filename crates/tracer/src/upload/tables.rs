@@ -3,9 +3,8 @@
 
 use super::{
     UploadError, Uploader,
-    geometry::Shapes,
-    pages::{PAGE, Pages},
-    placement::rounded_up,
+    geometry::{Growth, Shapes},
+    pages::Pages,
 };
 use crate::{bvh::Node, kernels::layout::Vertex};
 
@@ -32,15 +31,9 @@ impl Tables {
         upper_nodes: usize,
         uploader: &mut Uploader<'_>,
     ) -> Result<Self, UploadError> {
-        let nodes = rounded_up(shapes.nodes.len() as u32) as usize + upper_nodes;
-        let largest = [
-            nodes * size_of::<Node>(),
-            size_of_val(&shapes.positions[..]),
-            size_of_val(&shapes.triangles[..]),
-            size_of_val(&shapes.vertices[..]),
-        ];
-        uploader.check_memory("geometry", largest.iter().sum::<usize>() as u64)?;
-        if uploader.gpu.keeps_in_buffers(largest.map(|bytes| bytes as u64)) {
+        let largest = sizes(shapes, upper_nodes);
+        uploader.check_memory("geometry", largest.iter().sum())?;
+        if uploader.gpu.keeps_in_buffers(largest) {
             return Ok(Self::Buffers([
                 uploader.storage(LABELS[0], &shapes.nodes)?,
                 uploader.storage(LABELS[1], &shapes.positions)?,
@@ -78,35 +71,84 @@ impl Tables {
         }
     }
 
-    /// The first node of an upper level behind `shape_nodes` nodes.
-    pub(super) fn upper_root(&self, shape_nodes: u32) -> u32 {
+    /// These tables with what shapes have grown by since; `None` where they would no longer be what these are.
+    pub(super) fn grown(
+        &self,
+        shapes: &Shapes,
+        growth: &Growth,
+        upper_nodes: usize,
+        uploader: &mut Uploader<'_>,
+    ) -> Result<Option<Self>, UploadError> {
+        let tails = (
+            &shapes.nodes,
+            &shapes.positions,
+            &shapes.triangles[growth.triangles..],
+            &shapes.vertices[growth.vertices..],
+        );
         match self {
-            Self::Buffers(_) => rounded_up(shape_nodes),
-            // At the beginning of a row.
-            Self::Textures(_) => rounded_up(shape_nodes).next_multiple_of(PAGE),
+            Self::Buffers(buffers) => {
+                if !uploader.gpu.keeps_in_buffers(sizes(shapes, upper_nodes)) {
+                    return Ok(None);
+                }
+                let [nodes, positions, triangles, vertices] = buffers;
+                let at = growth.nodes as usize;
+                let nodes = uploader.longer(LABELS[0], (nodes, at), tails.0)?;
+                let positions = uploader.longer(LABELS[1], (positions, growth.triangles), tails.1)?;
+                let triangles = uploader.longer(LABELS[2], (triangles, growth.triangles), tails.2)?;
+                let vertices = uploader.longer(LABELS[3], (vertices, growth.vertices), tails.3)?;
+                let mut encoder = uploader.gpu.device.create_command_encoder(&Default::default());
+                for run in &growth.gone {
+                    let [at, bytes] =
+                        [run.start, run.len() as u32].map(|n| u64::from(n) * size_of::<[f32; 9]>() as u64);
+                    encoder.clear_buffer(&positions, at, Some(bytes));
+                }
+                uploader.gpu.queue.submit([encoder.finish()]);
+                Ok(Some(Self::Buffers([nodes, positions, triangles, vertices])))
+            }
+            Self::Textures(tables) => {
+                let heads = [
+                    growth.nodes as usize * NODE_TEXELS,
+                    growth.triangles * CORNERS,
+                    growth.triangles,
+                    growth.vertices * VERTEX_TEXELS,
+                ];
+                let texels: [Vec<Texel>; 4] = [
+                    tails.0.iter().flat_map(node_texels).collect(),
+                    tails.1.iter().flat_map(corner_texels).collect(),
+                    tails.2.to_vec(),
+                    tails.3.iter().flat_map(vertex_texels).collect(),
+                ];
+                let mut longer = |i: usize| uploader.longer_pages(LABELS[i], (&tables[i], heads[i]), &texels[i]);
+                let [nodes, positions, triangles, vertices] = [longer(0)?, longer(1)?, longer(2)?, longer(3)?];
+                for run in &growth.gone {
+                    let corners = vec![[0; 4]; run.len() * CORNERS];
+                    positions.put::<Texel>(uploader.gpu, run.start as usize * CORNERS, &corners);
+                }
+                Ok(Some(Self::Textures(Box::new([nodes, positions, triangles, vertices]))))
+            }
         }
     }
 
-    /// These tables with an upper level from node `root` on.
+    /// These tables with an upper level, if there is one, behind `shape_nodes` nodes, and its root in the place of the first node.
     pub(super) fn with_upper_level(
         &self,
         shape_nodes: u32,
-        root: u32,
         upper: &[Node],
         uploader: &mut Uploader<'_>,
     ) -> Result<Self, UploadError> {
+        let Some(root) = upper.first() else { return Ok(self.clone()) };
+        let shape_nodes = shape_nodes as usize;
         match self {
             Self::Buffers([nodes, others @ ..]) => {
-                let bytes = |nodes: u32| u64::from(nodes) * size_of::<Node>() as u64;
-                let nodes = uploader.appended(LABELS[0], (nodes, bytes(shape_nodes)), (bytes(root), upper))?;
+                let nodes = uploader.longer(LABELS[0], (nodes, shape_nodes), upper)?;
+                uploader.gpu.queue.write_buffer(&nodes, 0, bytemuck::bytes_of(root));
                 let [positions, triangles, vertices] = others.clone();
                 Ok(Self::Buffers([nodes, positions, triangles, vertices]))
             }
             Self::Textures(tables) => {
-                let texels = (root as usize + upper.len()) * NODE_TEXELS;
-                let nodes = uploader.empty_pages(LABELS[0], texels, upper.len() * NODE_TEXELS)?;
-                nodes.copy_from(uploader.gpu, &tables[0]);
-                nodes.write(uploader.gpu, root / PAGE * NODE_TEXELS as u32, upper.iter().flat_map(node_texels));
+                let texels: Vec<Texel> = upper.iter().flat_map(node_texels).collect();
+                let nodes = uploader.longer_pages(LABELS[0], (&tables[0], shape_nodes * NODE_TEXELS), &texels)?;
+                nodes.put(uploader.gpu, 0, &node_texels(root));
                 let mut tables = tables.clone();
                 tables[0] = nodes;
                 Ok(Self::Textures(tables))
@@ -115,7 +157,42 @@ impl Tables {
     }
 }
 
+/// Bytes of each table, with room for an upper level of so many nodes.
+fn sizes(shapes: &Shapes, upper_nodes: usize) -> [u64; 4] {
+    [
+        (shapes.node_count as usize + upper_nodes) * size_of::<Node>(),
+        shapes.triangles.len() * size_of::<[f32; 9]>(),
+        size_of_val(&shapes.triangles[..]),
+        size_of_val(&shapes.vertices[..]),
+    ]
+    .map(|bytes| bytes as u64)
+}
+
 impl Uploader<'_> {
+    /// The first `rows` of a buffer, and more.
+    fn longer<T: bytemuck::NoUninit>(
+        &mut self,
+        what: &'static str,
+        (start, rows): (&wgpu::Buffer, usize),
+        more: &[T],
+    ) -> Result<wgpu::Buffer, UploadError> {
+        let head = (rows * size_of::<T>()) as u64;
+        self.appended(what, (start, head), (head, more))
+    }
+
+    /// The first `head` texels of a stack of pages, and more.
+    fn longer_pages(
+        &mut self,
+        what: &'static str,
+        (start, head): (&Pages, usize),
+        more: &[Texel],
+    ) -> Result<Pages, UploadError> {
+        let pages = self.empty_pages(what, head + more.len(), more.len())?;
+        pages.copy_from(self.gpu, start);
+        pages.put(self.gpu, head, more);
+        Ok(pages)
+    }
+
     fn empty_pages(&mut self, what: &'static str, texels: usize, new_texels: usize) -> Result<Pages, UploadError> {
         let pages = Pages::new(self.gpu, what, wgpu::TextureFormat::Rgba32Uint, texels as u64)?;
         self.device_bytes += pages.bytes();
@@ -130,7 +207,7 @@ impl Uploader<'_> {
         texels: impl Iterator<Item = Texel>,
     ) -> Result<Pages, UploadError> {
         let pages = self.empty_pages(what, count, count)?;
-        pages.write(self.gpu, 0, texels);
+        pages.fill(self.gpu, texels);
         Ok(pages)
     }
 }

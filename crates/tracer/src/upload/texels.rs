@@ -51,6 +51,6 @@ fn stack(
     };
     let pages = Pages::new(gpu, label, format, total)?;
     *bytes += pages.bytes();
-    pages.write(gpu, 0, textures.iter().filter(|t| t.encoding == encoding).flat_map(|t| t.texels.iter().copied()));
+    pages.fill(gpu, textures.iter().filter(|t| t.encoding == encoding).flat_map(|t| t.texels.iter().copied()));
     Ok(pages.view)
 }

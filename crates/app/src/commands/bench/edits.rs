@@ -1,6 +1,7 @@
 //! From an edit, or a look elsewhere, to a picture that shows it.
 
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use anyhow::Context;
@@ -30,6 +31,10 @@ pub fn measure(gpu: &Gpu, args: &BenchArgs, subject: &Subject) -> anyhow::Result
     renderer.set_distribution(subject.distribution(Method::FvClip, place))?;
     trace(&mut renderer)?;
     picture.draw(&mut renderer)?;
+    // As the window does when the film has come to rest.
+    if let Some(rehearsal) = renderer.rehearsal(&Arc::new(scene.clone())) {
+        rehearsal.run(&AtomicBool::new(false))?.into_iter().for_each(|rehearsed| renderer.take_in(rehearsed));
+    }
 
     let mut shown = |edit: &dyn Fn(&mut Scene), times: u32| -> anyhow::Result<Vec<f64>> {
         let mut seconds = Vec::new();

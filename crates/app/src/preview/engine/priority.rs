@@ -3,7 +3,7 @@
 /// Lets all other threads of normal priority go before this one, and before those that it starts. Only on Linux, where threads
 /// have priorities of their own and the common CPU adapter starts its threads from the one that makes its device.
 #[cfg(target_os = "linux")]
-pub(super) fn give_way() {
+pub fn give_way() {
     /// `PRIO_PROCESS`, which means one thread on Linux; 0 is the calling one.
     const THREAD: std::ffi::c_int = 0;
     #[expect(
@@ -21,4 +21,4 @@ pub(super) fn give_way() {
 
 /// Elsewhere threads keep their priority.
 #[cfg(not(target_os = "linux"))]
-pub(super) fn give_way() {}
+pub fn give_way() {}
