@@ -46,6 +46,9 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<()> {
         let folder = args.report.as_deref().context("--only report needs --report")?;
         return page::write(folder, &kept);
     }
+    if cfg!(debug_assertions) && args.parts().contains(&Part::Rays) {
+        eprintln!("obvhs on the CPU is slower in this build than in one for release, the device is not");
+    }
     let gpu = Gpu::headless(&args.adapter.clone().map_or(AdapterSelect::Auto, AdapterSelect::Named))?;
     let subject = Subject::open(args)?;
     let mut here = json!({});
