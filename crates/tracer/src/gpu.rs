@@ -262,9 +262,9 @@ impl Gpu {
         }
     }
 
-    /// lavapipe of Mesa 22 reads storage buffers lane by lane with a comparison for each (docs/ARCHITECTURE.md).
+    /// lavapipe reads words of storage buffers one by one with a comparison for each, texels whole (docs/ARCHITECTURE.md).
     fn reads_textures_faster(&self) -> bool {
-        self.info.driver == "llvmpipe" && self.info.driver_info.starts_with("Mesa 22.")
+        self.info.driver == "llvmpipe"
     }
 
     /// Bytes of memory that are free for buffers and textures, where that can be known: on a software adapter under Linux, whose

@@ -243,19 +243,20 @@ fn reflect(
             _ if is_sampler(variable) => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
             _ => {
                 let naga::TypeInner::Image { arrayed, class, .. } = module.types[variable.ty].inner else { continue };
-                let holds_words = matches!(class, naga::ImageClass::Sampled { kind: naga::ScalarKind::Uint, .. });
-                wgpu::BindingType::Texture {
-                    sample_type: if holds_words {
-                        wgpu::TextureSampleType::Uint
-                    } else {
-                        wgpu::TextureSampleType::Float { filterable }
+                let view_dimension =
+                    if arrayed { wgpu::TextureViewDimension::D2Array } else { wgpu::TextureViewDimension::D2 };
+                match class {
+                    // The geometry's tables; nothing else is a storage texture.
+                    naga::ImageClass::Storage { .. } => wgpu::BindingType::StorageTexture {
+                        access: wgpu::StorageTextureAccess::ReadOnly,
+                        format: wgpu::TextureFormat::Rgba32Uint,
+                        view_dimension,
                     },
-                    view_dimension: if arrayed {
-                        wgpu::TextureViewDimension::D2Array
-                    } else {
-                        wgpu::TextureViewDimension::D2
+                    _ => wgpu::BindingType::Texture {
+                        sample_type: wgpu::TextureSampleType::Float { filterable },
+                        view_dimension,
+                        multisampled: false,
                     },
-                    multisampled: false,
                 }
             }
         };

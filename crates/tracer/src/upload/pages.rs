@@ -16,11 +16,12 @@ pub(super) struct Pages {
 }
 
 impl Pages {
-    /// Room for so many texels; at least one.
+    /// Room for so many texels, at least one, to be bound as `binding`.
     pub(super) fn new(
         gpu: &Gpu,
         what: &'static str,
         format: wgpu::TextureFormat,
+        binding: wgpu::TextureUsages,
         texels: u64,
     ) -> Result<Self, UploadError> {
         let page_texels = u64::from(PAGE) * u64::from(PAGE);
@@ -44,7 +45,7 @@ impl Pages {
             sample_count: 1,
             dimension: wgpu::TextureDimension::D2,
             format,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC,
+            usage: binding | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC,
             view_formats: &[],
         });
         let view = texture.create_view(&wgpu::TextureViewDescriptor {

@@ -194,7 +194,8 @@ impl Uploader<'_> {
     }
 
     fn empty_pages(&mut self, what: &'static str, texels: usize, new_texels: usize) -> Result<Pages, UploadError> {
-        let pages = Pages::new(self.gpu, what, wgpu::TextureFormat::Rgba32Uint, texels as u64)?;
+        let binding = wgpu::TextureUsages::STORAGE_BINDING;
+        let pages = Pages::new(self.gpu, what, wgpu::TextureFormat::Rgba32Uint, binding, texels as u64)?;
         self.device_bytes += pages.bytes();
         self.uploaded_bytes += (new_texels * size_of::<Texel>()) as u64;
         Ok(pages)

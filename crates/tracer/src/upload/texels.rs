@@ -49,7 +49,7 @@ fn stack(
         TexelEncoding::Srgb => (wgpu::TextureFormat::Rgba8UnormSrgb, "sRGB texels"),
         TexelEncoding::Linear => (wgpu::TextureFormat::Rgba8Unorm, "linear texels"),
     };
-    let pages = Pages::new(gpu, label, format, total)?;
+    let pages = Pages::new(gpu, label, format, wgpu::TextureUsages::TEXTURE_BINDING, total)?;
     *bytes += pages.bytes();
     pages.fill(gpu, textures.iter().filter(|t| t.encoding == encoding).flat_map(|t| t.texels.iter().copied()));
     Ok(pages.view)
