@@ -254,17 +254,20 @@ impl Gpu {
     /// Whether geometry whose tables have these sizes in bytes is to be in storage buffers.
     pub(crate) fn keeps_in_buffers(&self, tables: [u64; 4]) -> bool {
         match self.geometry {
-            GeometryPlace::Auto => {
-                tables.iter().all(|&bytes| bytes <= self.largest_binding()) && !self.reads_textures_faster()
-            }
+            // lavapipe reads words of storage buffers one by one with a comparison for each, texels whole.
+            GeometryPlace::Auto => tables.iter().all(|&bytes| bytes <= self.largest_binding()) && !self.is_lavapipe(),
             GeometryPlace::Buffers => true,
             GeometryPlace::Textures => false,
         }
     }
 
-    /// lavapipe reads words of storage buffers one by one with a comparison for each, texels whole (docs/ARCHITECTURE.md).
-    fn reads_textures_faster(&self) -> bool {
+    fn is_lavapipe(&self) -> bool {
         self.info.driver == "llvmpipe"
+    }
+
+    /// Whether this is lavapipe of Mesa 22, where much measures otherwise than in later ones.
+    pub(crate) fn is_lavapipe_22(&self) -> bool {
+        self.is_lavapipe() && self.info.driver_info.starts_with("Mesa 22.")
     }
 
     /// Bytes of memory that are free for buffers and textures, where that can be known: on a software adapter under Linux, whose

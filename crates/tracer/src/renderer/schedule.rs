@@ -27,10 +27,10 @@ pub enum Schedule {
 }
 
 impl Schedule {
-    /// What is used on adapters of this kind unless asked otherwise: the megakernel, which measured faster on most of those at hand
-    /// (docs/ARCHITECTURE.md has the figures). No graphics card was among them.
-    pub fn preferred_on(_gpu: &Gpu) -> Self {
-        Self::Megakernel
+    /// What is used on adapters of this kind unless asked otherwise: the wavefront on lavapipe of Mesa 22 and the megakernel
+    /// elsewhere, by what measured faster (docs/ARCHITECTURE.md has the figures). No graphics card was among the adapters.
+    pub fn preferred_on(gpu: &Gpu) -> Self {
+        if gpu.is_lavapipe_22() { Self::Wavefront } else { Self::Megakernel }
     }
 
     /// The other one.
