@@ -108,8 +108,7 @@ impl Bench {
     let c = prepare(case_index);
 {body}"
         );
-        let sources = instead_of_paths(&plant(renderer.shaders()), IMPORTS, &self.items(), &body);
-        renderer.set_shaders(sources).expect("the modules compose");
+        instead_of_paths(&mut renderer, plant, [IMPORTS, &self.items(), &body]);
         renderer.set_scene(&self.scene()).expect("the kernel compiles");
         let snapshot =
             device::trace(&mut renderer, u64::from(samples) * u64::from(self.cases())).expect("the device answers");

@@ -1,6 +1,9 @@
 //! Shader modules with something planted in them: a fault that a test must notice, or known values in place of paths.
 
-use tracer::kernels::ShaderSources;
+use tracer::{
+    kernels::ShaderSources,
+    renderer::{Renderer, Schedule},
+};
 
 /// The module with one passage exchanged.
 ///
@@ -15,9 +18,16 @@ pub fn exchanged(sources: &ShaderSources, module: &str, passages: &[(&str, &str)
     sources.clone().with_module(module, text)
 }
 
-/// These modules with a kernel in place of the path tracer whose `body` sets `radiance`, `pixel`, `rays` and `index` of a
-/// sample from its `invocation`; `imports` and `items` go before it.
-pub fn instead_of_paths(sources: &ShaderSources, imports: &str, items: &str, body: &str) -> ShaderSources {
+/// Gives the renderer a kernel in place of the path tracer whose `body` sets `radiance`, `pixel`, `rays` and `index` of a
+/// sample from its `invocation`; `imports` and `items` go before it, and `plant` may exchange more. It has no wavefront.
+///
+/// # Panics
+/// When the modules do not compose.
+pub fn instead_of_paths(
+    renderer: &mut Renderer,
+    plant: impl Fn(&ShaderSources) -> ShaderSources,
+    [imports, items, body]: [&str; 3],
+) {
     let text = format!(
         "// Kernel: known records in place of paths, for tests.
 import package::path_bindings::{{batch, records}};
@@ -42,5 +52,7 @@ fn trace(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) grou
 }}
 "
     );
-    sources.clone().with_module("path::trace", text)
+    renderer.set_schedule(Schedule::Megakernel).expect("nothing is compiled yet");
+    let sources = plant(&renderer.shaders().clone().with_module("path::trace", text));
+    renderer.set_shaders(sources).expect("the modules compose");
 }

@@ -106,8 +106,7 @@ fn hits(scene: &Scene, kind: HierarchyKind) -> Vec<Option<(f64, u32, u32)>> {
     let gpu = device::gpu();
     let options = RendererOptions { film: FILM, ..Default::default() };
     let mut renderer = Renderer::new(&gpu, &options, Distribution::omnidirectional(device::inverse())).unwrap();
-    let sources = instead_of_paths(renderer.shaders(), IMPORTS, ITEMS, BODY);
-    renderer.set_shaders(sources).unwrap();
+    instead_of_paths(&mut renderer, Clone::clone, [IMPORTS, ITEMS, BODY]);
     renderer.set_hierarchy(kind);
     renderer.set_scene(scene).unwrap();
     let film = device::trace(&mut renderer, FILM.pixels()).unwrap();

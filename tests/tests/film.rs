@@ -28,8 +28,7 @@ fn renderer(gpu: &Gpu, film: FilmOptions, sequence: SequenceKind) -> Renderer {
 
 fn planted(gpu: &Gpu, film: FilmOptions, imports: &str, items: &str, body: &str) -> Renderer {
     let mut renderer = renderer(gpu, film, SequenceKind::Sobol);
-    let sources = instead_of_paths(renderer.shaders(), imports, items, body);
-    renderer.set_shaders(sources).unwrap();
+    instead_of_paths(&mut renderer, Clone::clone, [imports, items, body]);
     renderer.set_scene(&scenes::empty(Vec3::ONE)).unwrap();
     renderer
 }

@@ -32,19 +32,15 @@ fn errors(
     let gpu = device::gpu();
     let options = RendererOptions { film: FILM, max_bounces: 1, seed: 5, sequence };
     let mut renderer = Renderer::new(&gpu, &options, distribution).unwrap();
-    let sources = instead_of_paths(
-        renderer.shaders(),
-        "import package::sampling::random::{start_random, first_random_2, next_random_2};
-import package::sampling::distribution::choose_pixel;",
-        "",
-        "    var random = start_random(invocation);
+    let body = "    var random = start_random(invocation);
     pixel = choose_pixel(first_random_2(&random), random);
     let place = next_random_2(&random);
     let second = next_random_2(&random);
     let third = next_random_2(&random);
-    radiance = vec3f(place.x, second.x, select(0.0, 1.0, third.x < third.y));",
-    );
-    renderer.set_shaders(plant(&sources)).unwrap();
+    radiance = vec3f(place.x, second.x, select(0.0, 1.0, third.x < third.y));";
+    let imports = "import package::sampling::random::{start_random, first_random_2, next_random_2};
+import package::sampling::distribution::choose_pixel;";
+    instead_of_paths(&mut renderer, plant, [imports, "", body]);
     renderer.set_scene(&scenes::empty(Vec3::ONE)).unwrap();
     // Not a power of two of samples a pixel in one piece: batches may end anywhere.
     renderer.render(StopCondition::Samples(u64::from(PER_PIXEL) * FILM.pixels()), |_| true).unwrap();

@@ -464,8 +464,7 @@ fn many_samples_in_one_pixel() {
     let mut renderer = Renderer::new(&gpu, &options, Distribution::omnidirectional(device::inverse())).unwrap();
     // A third has no end in binary; every 64th sample is a thousand times as bright.
     let body = "    radiance = vec3f(select(1.0, 1000.0, index % 64u == 0u) / 3.0);\n    pixel = 0u;\n";
-    let sources = instead_of_paths(renderer.shaders(), "", "", body);
-    renderer.set_shaders(sources).unwrap();
+    instead_of_paths(&mut renderer, Clone::clone, ["", "", body]);
     renderer.set_scene(&scenes::empty(Vec3::splat(400.0))).unwrap();
     let film = device::trace(&mut renderer, 1 << log2).unwrap();
     let pixel = film.pixel(0);
