@@ -32,8 +32,8 @@ impl Tables {
         uploader: &mut Uploader<'_>,
     ) -> Result<Self, UploadError> {
         let largest = sizes(shapes, upper_nodes);
-        uploader.check_memory("geometry", largest.iter().sum())?;
         if uploader.gpu.keeps_in_buffers(largest) {
+            uploader.check_memory("geometry", largest.iter().sum())?;
             return Ok(Self::Buffers([
                 uploader.storage(LABELS[0], &shapes.nodes)?,
                 uploader.storage(LABELS[1], &shapes.positions)?,
@@ -41,6 +41,10 @@ impl Tables {
                 uploader.storage(LABELS[3], &shapes.vertices)?,
             ]));
         }
+        let texels = (shapes.node_count as usize + upper_nodes) * NODE_TEXELS
+            + shapes.triangles.len() * (CORNERS + 1)
+            + shapes.vertices.len() * VERTEX_TEXELS;
+        uploader.check_memory("geometry", (texels * size_of::<Texel>()) as u64)?;
         let nodes = shapes.nodes.iter().flat_map(node_texels);
         let positions = shapes.positions.iter().flat_map(corner_texels);
         let vertices = shapes.vertices.iter().flat_map(vertex_texels);
