@@ -10,8 +10,8 @@ use tracer::{
     distribution::Distribution,
     film::{FilmOptions, FilmSnapshot},
     gpu::{GeometryPlace, Gpu},
-    kernels::Kernel,
-    renderer::{FilmPose, Query, QueryAnswer, RayKind, Renderer, RendererOptions},
+    kernels::{Kernel, KernelKey},
+    renderer::{FilmPose, Query, QueryAnswer, RayKind, Renderer, RendererOptions, Schedule},
     scene::{Environment, Scene},
 };
 
@@ -201,23 +201,31 @@ fn rays_to_everywhere(origin: Vec3) -> Vec<Query> {
 
 /// A rehearsal has the driver compile what the first move needs, whatever moves.
 #[test]
-fn a_rehearsed_move_compiles_the_kernel_of_the_first_move() {
+fn a_rehearsed_move_compiles_the_kernels_of_the_first_move() {
     let _time = device::Stopwatch::start("edits");
+    for schedule in [Schedule::Megakernel, Schedule::Wavefront] {
+        rehearses(schedule);
+    }
+}
+
+fn rehearses(schedule: Schedule) {
     let gpu = device::gpu();
     let (mut scene, _) = builtin::scene().unwrap();
     let mut edited = renderer(&gpu, &scene);
+    edited.set_schedule(schedule).unwrap();
+    let keys = |renderer: &Renderer| schedule.kernels().iter().map(|&kernel| renderer.key(kernel)).collect::<Vec<_>>();
     let rehearsal = edited.rehearsal(&Arc::new(scene.clone())).unwrap();
-    let before = edited.key(Kernel::Trace);
+    let before = keys(&edited);
     let rehearsed = rehearsal.run(&AtomicBool::new(false)).unwrap().unwrap();
-    assert_ne!(*rehearsed.key(), before);
+    let compiled: Vec<KernelKey> = rehearsed.keys().cloned().collect();
+    assert_ne!(compiled, before);
     assert!(rehearsal.run(&AtomicBool::new(true)).unwrap().is_none(), "does not stop");
     let (instance, _) = at_the_centre(&mut edited, &scene);
     scene.instances[instance].world_from_mesh.translation.y += 0.1;
     let mut unprepared = renderer(&gpu, &scene);
-    let key = rehearsed.key().clone();
     edited.take_in(rehearsed);
     edited.set_scene(&scene).unwrap();
-    assert_eq!(edited.key(Kernel::Trace), key);
+    assert_eq!(keys(&edited), compiled);
     let (off, mean_off) = difference(&picture(&mut unprepared), &picture(&mut edited));
     assert!(mean_off < 1e-3 && off < 0.1, "not the picture of a fresh renderer");
     assert!(edited.rehearsal(&Arc::new(scene)).is_none(), "nothing is left to rehearse");

@@ -3,7 +3,7 @@
 //! A scene that nothing has been moved in has one level; the first move needs kernels with two, which a driver may compile for
 //! seconds. Some compile at the first dispatch, and hold up the device's queue meanwhile. A rehearsal makes that move with a copy of
 //! the scene on a device of its own, in a thread of its caller's: what the driver keeps of it is there when the move comes. The
-//! renderer gets a pipeline on its own device.
+//! renderer gets pipelines on its own device.
 
 use std::sync::{
     Arc,
@@ -38,17 +38,14 @@ pub struct Rehearsal {
     instance: usize,
 }
 
-/// The kernel of a first move, compiled.
+/// The kernels of a first move, compiled.
 #[derive(Debug)]
-pub struct Rehearsed {
-    key: KernelKey,
-    pipeline: Arc<Pipeline>,
-}
+pub struct Rehearsed(Vec<(KernelKey, Arc<Pipeline>)>);
 
 impl Rehearsed {
-    /// What it is.
-    pub fn key(&self) -> &KernelKey {
-        &self.key
+    /// What they are.
+    pub fn keys(&self) -> impl Iterator<Item = &KernelKey> {
+        self.0.iter().map(|(key, _)| key)
     }
 }
 
@@ -61,7 +58,7 @@ pub enum RehearsalError {
     /// It cannot render the scene.
     #[error(transparent)]
     Render(#[from] RenderError),
-    /// The kernel does not compile on the renderer's own device.
+    /// A kernel does not compile on the renderer's own device.
     #[error(transparent)]
     Kernel(#[from] KernelError),
 }
@@ -88,9 +85,11 @@ impl Renderer {
         })
     }
 
-    /// Keeps a kernel for the move that comes.
+    /// Keeps kernels for the move that comes.
     pub fn take_in(&mut self, rehearsed: Rehearsed) {
-        self.pipelines.take_in(rehearsed.key, rehearsed.pipeline);
+        for (key, pipeline) in rehearsed.0 {
+            self.pipelines.take_in(key, pipeline);
+        }
     }
 }
 
@@ -101,7 +100,7 @@ fn smallest(scene: &Scene) -> Option<usize> {
 }
 
 impl Rehearsal {
-    /// Makes the move. Returns the kernel that it took, for the renderer to [take in](Renderer::take_in), or `None` if it was told to
+    /// Makes the move. Returns the kernels that it took, for the renderer to [take in](Renderer::take_in), or `None` if it was told to
     /// stop before.
     ///
     /// # Errors
@@ -117,8 +116,11 @@ impl Rehearsal {
         let mut moved = (*self.scene).clone();
         moved.instances[self.instance].world_from_mesh.translation.x += 1e-3;
         renderer.set_scene(&moved)?;
-        let key = renderer.key(Kernel::Trace);
-        let pipeline = Arc::new(Pipeline::create(&self.gpu.device, &key, None)?);
-        Ok(Some(Rehearsed { key, pipeline }))
+        let compiled = self.schedule.kernels().iter().map(|&kernel| {
+            let key = renderer.key(kernel);
+            let pipeline = Arc::new(Pipeline::create(&self.gpu.device, &key, None)?);
+            Ok((key, pipeline))
+        });
+        Ok(Some(Rehearsed(compiled.collect::<Result<_, KernelError>>()?)))
     }
 }

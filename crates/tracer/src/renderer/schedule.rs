@@ -42,6 +42,14 @@ impl Schedule {
         }
     }
 
+    /// The kernels that trace paths.
+    pub const fn kernels(self) -> &'static [Kernel] {
+        match self {
+            Self::Megakernel => &[Kernel::Trace],
+            Self::Wavefront => &[Kernel::Start, Kernel::Extend, Kernel::Shade],
+        }
+    }
+
     /// Its name on the command line and in reports.
     pub const fn name(self) -> &'static str {
         match self {
