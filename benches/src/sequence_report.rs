@@ -1,9 +1,8 @@
-//! `sequence-report OUT_DIR SCENE...`: what Owen-scrambled Sobol points gain over independent ones where the eye looks.
+//! `sequence-report OUT_DIR SCENE...`: what low-discrepancy points gain over independent ones where the eye looks and over a panorama.
 //!
-//! FV, 8 bounces, a film of 512x256, the gaze at its centre; 16 seeds of each sequence. At 16, 64 and 256 samples a pixel of the
-//! foveal disc (5.79 degrees): the variance of the pixels' luminance over the seeds, relative to its square, mean over the disc's
-//! pixels; and the ratio of the two sequences with its standard error (jackknife over the seeds). Neither depends on the
-//! machine's speed. Writes `sequence.json` (raw numbers) and `sequence.md` (the table).
+//! 8 bounces; see [`PARTS`] for films, samples and seeds. The variance of the pixels' luminance over the seeds, relative to its square,
+//! mean over the pixels (in FV those of the foveal disc, 5.79 degrees); and the ratio of the two sequences with its standard error
+//! (jackknife over the seeds). Neither depends on the machine's speed. Writes `sequence.json` (raw numbers) and `sequence.md`.
 
 use std::{path::Path, process::ExitCode, sync::Arc};
 
@@ -19,10 +18,36 @@ use tracer::{
     renderer::{Renderer, RendererOptions, SequenceKind, StopCondition},
 };
 
-const FILM: FilmOptions = FilmOptions::equirect(512, 256);
-const SEEDS: u32 = 16;
-/// Samples a pixel of the foveal disc.
-const DEPTHS: [u32; 3] = [16, 64, 256];
+/// Where pixels are looked at.
+struct Part {
+    name: &'static str,
+    title: &'static str,
+    film: FilmOptions,
+    is_foveated: bool,
+    /// Samples a pixel.
+    depths: &'static [u32],
+    seeds: u32,
+}
+
+const PARTS: [Part; 2] = [
+    Part {
+        name: "fovea",
+        title: "In the fovea: FV, the gaze at the film's centre",
+        film: FilmOptions::equirect(512, 256),
+        is_foveated: true,
+        depths: &[16, 64, 256],
+        seeds: 16,
+    },
+    Part {
+        name: "panorama",
+        title: "Over the panorama: OD",
+        film: FilmOptions::equirect(256, 128),
+        is_foveated: false,
+        depths: &[16],
+        seeds: 8,
+    },
+];
+
 /// Samples of FV that fall on a pixel of the disc for each on a pixel of OD (facts of the default distribution: 63.4 at
 /// the gaze, 60.5 with the floor).
 const DENSITY: f64 = 60.5;
@@ -37,50 +62,64 @@ fn run(args: &[String]) -> Result<(), AnyError> {
     let gpu = Gpu::headless(&AdapterSelect::Auto)?;
     let mut scenes = Vec::new();
     for file in files {
-        scenes.push(measure(&gpu, &Subject::open(Some(Path::new(file)))?)?);
+        let subject = Subject::open(Some(Path::new(file)))?;
+        for part in &PARTS {
+            scenes.push(measure(&gpu, &subject, part)?);
+        }
     }
     let provenance = Provenance::on(&gpu);
     let machine: serde_json::Map<_, _> =
         provenance.fields().into_iter().map(|(name, value)| (name.into(), value.into())).collect();
-    let raw = json!({ "machine": machine, "seeds": SEEDS, "scenes": scenes });
+    let raw = json!({ "machine": machine, "parts": scenes });
     std::fs::create_dir_all(out)?;
     std::fs::write(Path::new(out).join("sequence.json"), format!("{raw:#}\n"))?;
     std::fs::write(Path::new(out).join("sequence.md"), table(&raw))?;
     Ok(())
 }
 
-/// Luminance of each pixel of the disc.
-type Disc = Vec<f64>;
+/// Luminance of each pixel that is looked at.
+type Pixels = Vec<f64>;
 
-/// The discs at each depth, and the mean samples a pixel there.
-fn trace(gpu: &Gpu, subject: &Subject, sequence: SequenceKind, seed: u32) -> Result<Vec<(Disc, f64)>, AnyError> {
+/// The pixels at each depth, and the mean samples there.
+fn trace(
+    gpu: &Gpu,
+    subject: &Subject,
+    part: &Part,
+    sequence: SequenceKind,
+    seed: u32,
+) -> Result<Vec<(Pixels, f64)>, AnyError> {
     let acuity = RadialDistribution::new(Reddy2001, Geometry::Sphere, Angle::from_degrees(80.0), 0.002)?;
-    let gaze = Gaze::Scene { direction: Vec3::NEG_Z };
-    let foveated = Distribution::foveated(gaze, None, Arc::new(Inverse::default_for(&acuity)));
-    let options = RendererOptions { film: FILM, seed, sequence, ..Default::default() };
-    let mut renderer = Renderer::new(gpu, &options, foveated)?;
+    let inverse = Arc::new(Inverse::default_for(&acuity));
+    let (distribution, density) = if part.is_foveated {
+        (Distribution::foveated(Gaze::Scene { direction: Vec3::NEG_Z }, None, inverse), DENSITY)
+    } else {
+        (Distribution::omnidirectional(inverse), 1.0)
+    };
+    let options = RendererOptions { film: part.film, seed, sequence, ..Default::default() };
+    let mut renderer = Renderer::new(gpu, &options, distribution)?;
     renderer.set_scene(&subject.scene)?;
     renderer.set_pose(subject.pose);
-    let mut discs = Vec::new();
-    for depth in DEPTHS {
-        let samples = f64::from(depth) / DENSITY * FILM.pixels() as f64;
+    let mut found = Vec::new();
+    for &depth in part.depths {
+        let samples = f64::from(depth) / density * part.film.pixels() as f64;
         renderer.render(StopCondition::Samples(samples as u64), |_| true)?;
         let film = renderer.snapshot()?;
         let inside = film.pixels().enumerate().filter(|(index, _)| {
-            let (x, y) = (*index as u32 % FILM.width, *index as u32 / FILM.width);
-            film_direction(&FILM, x, y).angle_between(Vec3::NEG_Z) < FOVEA_DEG.to_radians()
+            let (x, y) = (*index as u32 % part.film.width, *index as u32 / part.film.width);
+            let from_gaze = film_direction(&part.film, x, y).angle_between(Vec3::NEG_Z);
+            !part.is_foveated || from_gaze < FOVEA_DEG.to_radians()
         });
         let pixels: Vec<_> = inside.map(|(_, pixel)| pixel).collect();
         let count = pixels.iter().map(|pixel| f64::from(pixel.samples)).sum::<f64>() / pixels.len() as f64;
         let luminance = |rgb: [f64; 3]| 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
-        discs.push((pixels.iter().map(|pixel| luminance(pixel.mean)).collect(), count));
+        found.push((pixels.iter().map(|pixel| luminance(pixel.mean)).collect(), count));
     }
-    Ok(discs)
+    Ok(found)
 }
 
 /// Variance over the seeds relative to the mean's square, mean over the pixels; seed `left_out` does not take part.
-fn relative_variance(discs: &[&Disc], left_out: Option<usize>) -> f64 {
-    let used: Vec<&Disc> = discs.iter().enumerate().filter(|(i, _)| Some(*i) != left_out).map(|(_, d)| *d).collect();
+fn relative_variance(discs: &[&Pixels], left_out: Option<usize>) -> f64 {
+    let used: Vec<&Pixels> = discs.iter().enumerate().filter(|(i, _)| Some(*i) != left_out).map(|(_, d)| *d).collect();
     let n = used.len() as f64;
     let pixels = used[0].len();
     let of_pixel = |p: usize| {
@@ -92,20 +131,22 @@ fn relative_variance(discs: &[&Disc], left_out: Option<usize>) -> f64 {
     variance / square
 }
 
-fn measure(gpu: &Gpu, subject: &Subject) -> Result<Value, AnyError> {
-    eprintln!("{} ...", subject.name);
+fn measure(gpu: &Gpu, subject: &Subject, part: &Part) -> Result<Value, AnyError> {
+    eprintln!("{}, {} ...", subject.name, part.name);
     let mut runs = Vec::new();
     for sequence in [SequenceKind::Independent, SequenceKind::Sobol] {
-        let seeds = (1..=SEEDS).map(|seed| trace(gpu, subject, sequence, seed)).collect::<Result<Vec<_>, _>>()?;
+        let seeds =
+            (1..=part.seeds).map(|seed| trace(gpu, subject, part, sequence, seed)).collect::<Result<Vec<_>, _>>()?;
         runs.push(seeds);
     }
     let mut rows = Vec::new();
-    for (level, depth) in DEPTHS.iter().enumerate() {
-        let discs: Vec<Vec<&Disc>> = runs.iter().map(|seeds| seeds.iter().map(|run| &run[level].0).collect()).collect();
+    for (level, depth) in part.depths.iter().enumerate() {
+        let discs: Vec<Vec<&Pixels>> =
+            runs.iter().map(|seeds| seeds.iter().map(|run| &run[level].0).collect()).collect();
         let variances = [relative_variance(&discs[0], None), relative_variance(&discs[1], None)];
         let ratio = variances[1] / variances[0];
         // Seeds of the two sequences are independent: the relative errors add in squares.
-        let relative_error = |discs: &[&Disc], whole: f64| {
+        let relative_error = |discs: &[&Pixels], whole: f64| {
             let n = discs.len() as f64;
             let spread =
                 (0..discs.len()).map(|i| (relative_variance(discs, Some(i)) / whole - 1.0).powi(2)).sum::<f64>();
@@ -119,35 +160,37 @@ fn measure(gpu: &Gpu, subject: &Subject) -> Result<Value, AnyError> {
             "standard_error": error,
         }));
     }
-    Ok(json!({ "scene": subject.name, "rows": rows }))
+    Ok(json!({ "scene": subject.name, "part": part.name, "seeds": part.seeds, "rows": rows }))
 }
 
 fn table(raw: &Value) -> String {
-    let mut text = String::from("# Sobol points against independent ones, in the fovea\n\n");
+    let mut text = String::from("# A pixel's sequence against independent points\n\n");
     if let Some(machine) = raw["machine"].as_object() {
         for (name, value) in machine {
             text += &format!("- {name}: {}\n", value.as_str().unwrap_or_default());
         }
     }
-    text += &format!(
-        "- FV, film 512x256, 8 bounces, foveal disc of {FOVEA_DEG} degrees, {SEEDS} seeds of each sequence\n- made by `cargo run \
-         -p fovea-benches --bin sequence-report -- docs/reports SCENE...`; raw numbers in sequence.json\n\n"
-    );
-    text += "| scene | samples a foveal pixel | relative variance, independent | Sobol | Sobol / independent |\n";
-    text += "|---|---|---|---|---|\n";
-    for scene in raw["scenes"].as_array().into_iter().flatten() {
-        for row in scene["rows"].as_array().into_iter().flatten() {
-            let number = |key: &str| row[key].as_f64().unwrap_or(f64::NAN);
-            text += &format!(
-                "| {} | {:.1} | {:.3e} | {:.3e} | {:.3} +- {:.3} |\n",
-                scene["scene"].as_str().unwrap_or_default(),
-                row["mean_samples"][0].as_f64().unwrap_or(f64::NAN),
-                number("independent"),
-                number("sobol"),
-                number("ratio"),
-                number("standard_error")
-            );
+    text += "- 8 bounces; made by `cargo run -p fovea-benches --bin sequence-report -- docs/reports SCENE...`; raw numbers in \
+             sequence.json\n";
+    for part in &PARTS {
+        let [width, height] = [part.film.width, part.film.height];
+        text += &format!("\n## {}\n\nFilm {width}x{height}, {} seeds of each sequence.\n\n", part.title, part.seeds);
+        text += "| scene | samples a pixel | relative variance, independent | sequence | sequence / independent |\n";
+        text += "|---|---|---|---|---|\n";
+        for found in raw["parts"].as_array().into_iter().flatten().filter(|found| found["part"] == part.name) {
+            for row in found["rows"].as_array().into_iter().flatten() {
+                let number = |key: &str| row[key].as_f64().unwrap_or(f64::NAN);
+                text += &format!(
+                    "| {} | {:.1} | {:.3e} | {:.3e} | {:.3} +- {:.3} |\n",
+                    found["scene"].as_str().unwrap_or_default(),
+                    row["mean_samples"][0].as_f64().unwrap_or(f64::NAN),
+                    number("independent"),
+                    number("sobol"),
+                    number("ratio"),
+                    number("standard_error")
+                );
+            }
         }
     }
-    text
+    text + include_str!("sequence_notes.md")
 }

@@ -197,22 +197,26 @@ fn sequences_equal_their_twins() {
     let gpu = software_or_default();
     let main = "
 @group(0) @binding(0) var<storage, read> words: array<vec2<u32>>;
-struct Row { words: vec4<u32>, pair: vec2<u32>, shuffled: vec2<u32> }
+struct Row { words: vec4<u32>, pair: vec2<u32>, shuffled: vec2<u32>, vertex: vec4<u32>, below: vec4<u32> }
 @group(0) @binding(1) var<storage, read_write> rows: array<Row>;
 @compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x < arrayLength(&words) {
         let w = words[id.x];
         let scrambled = owen_scramble(w.x, hash_combine(w.y, id.x));
         let numbers = vec4<u32>(scrambled, independent_u32(w.x, id.x, w.y), bitcast<u32>(to_unit(w.x)), strata_order(w.x & 1023u, 10u));
-        rows[id.x] = Row(numbers, sobol_pair(w.x), shuffled_pair(w.x, id.x, w.y));
+        let vertex = vertex_numbers(w.x, id.x, w.y);
+        let below = vec4<u32>(count_below(w.x, w.y & 0xffffff00u, id.x), 0u, 0u, 0u);
+        rows[id.x] = Row(numbers, sobol_pair(w.x), shuffled_pair(w.x, id.x, w.y), vertex, below);
     }
 }
 ";
     let words: Vec<[u32; 2]> = (0..4096).map(|i| [sequence::hash(i), sequence::hash(!i)]).collect();
     let text = wgsl::sequence_module() + main;
-    let rows: Vec<[u32; 8]> = run(&gpu, &text, bytemuck::cast_slice(&words), words.len());
+    let rows: Vec<[u32; 16]> = run(&gpu, &text, bytemuck::cast_slice(&words), words.len());
     for (i, ([x, seed], row)) in (0_u32..).zip(words.iter().zip(rows)) {
         let ([a, b], [c, d]) = (sequence::sobol_pair(*x), sequence::shuffled_pair(*x, i, *seed));
+        let [e, f, g, h] = sequence::vertex_numbers(*x, i, *seed);
+        let below = sequence::Below { bound: seed & !0xff, root: i };
         let expected = [
             sequence::owen_scramble(*x, sequence::hash_combine(*seed, i)),
             sequence::independent(*x, i, *seed),
@@ -222,6 +226,14 @@ struct Row { words: vec4<u32>, pair: vec2<u32>, shuffled: vec2<u32> }
             b,
             c,
             d,
+            e,
+            f,
+            g,
+            h,
+            below.count(*x),
+            0,
+            0,
+            0,
         ];
         assert_eq!(row, expected, "{x:x} {seed:x}");
     }

@@ -1,6 +1,6 @@
 //! The numbers that a sample's path draws: in OD each film pixel is a stratum, so the samples of a pixel must be as even among
 //! themselves as a (0, 2)-sequence is, in every pair, whatever their number in the whole film. Over a list of pixels one is a few
-//! strata.
+//! strata. About the gaze of FV each pixel numbers its samples.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use fovea_tests::{
 };
 use glam::Vec3;
 use tracer::{
-    distribution::{Distribution, Layer},
+    distribution::{Distribution, Gaze, Layer, film_direction},
     film::FilmOptions,
     kernels::ShaderSources,
     renderer::{Renderer, RendererOptions, SequenceKind, StopCondition},
@@ -22,8 +22,8 @@ use tracer::{
 const FILM: FilmOptions = FilmOptions::equirect(32, 16);
 const PER_PIXEL: u32 = 64;
 
-/// Root mean square error of the pixels' means of three numbers whose mean is a half: the first number of the second pair (the place
-/// in the pixel), of the third, and whether a point of the fourth lies below the diagonal.
+/// Root mean square error of the pixels' means of three numbers whose mean is a half: the place in the pixel, the first vertex's
+/// direction, and whether its point on a light lies below the diagonal.
 fn errors(
     sequence: SequenceKind,
     distribution: Distribution,
@@ -34,11 +34,10 @@ fn errors(
     let mut renderer = Renderer::new(&gpu, &options, distribution).unwrap();
     let body = "    var random = start_random(invocation);
     pixel = choose_pixel(first_random_2(&random), random);
-    let place = next_random_2(&random);
-    let second = next_random_2(&random);
-    let third = next_random_2(&random);
-    radiance = vec3f(place.x, second.x, select(0.0, 1.0, third.x < third.y));";
-    let imports = "import package::sampling::random::{start_random, first_random_2, next_random_2};
+    let place = place_in_pixel(random);
+    let vertex = next_vertex(&random);
+    radiance = vec3f(place.x, vertex.direction.x, select(0.0, 1.0, vertex.light.x < vertex.light.y));";
+    let imports = "import package::sampling::random::{start_random, first_random_2, place_in_pixel, next_vertex};
 import package::sampling::distribution::choose_pixel;";
     instead_of_paths(&mut renderer, plant, [imports, "", body]);
     renderer.set_scene(&scenes::empty(Vec3::ONE)).unwrap();
@@ -105,4 +104,77 @@ fn numbers_of_the_whole_film_are_noticed() {
         )
     });
     assert!(first > 2.0 * even() && second > 2.0 * even(), "{first} {second} for {}", even());
+}
+
+/// A film on which a pixel's ten degrees cannot hide from the table, and a gaze near its middle.
+const WIDE_FILM: FilmOptions = FilmOptions::equirect(512, 256);
+
+fn looking() -> Distribution {
+    let gaze = Gaze::Scene { direction: Vec3::new(0.3, 0.2, -1.0).normalize() };
+    Distribution::foveated(gaze, None, device::inverse())
+}
+
+/// Samples, and sums of number and its square, of the pixels within five degrees of the gaze.
+fn numbers_in_pixels(batches: &[u64], plant: impl Fn(&ShaderSources) -> ShaderSources) -> Vec<[f64; 3]> {
+    let gpu = device::gpu();
+    let options = RendererOptions { film: WIDE_FILM, max_bounces: 1, seed: 9, sequence: SequenceKind::Sobol };
+    let mut renderer = Renderer::new(&gpu, &options, looking()).unwrap();
+    // The film holds samples up to 16: numbers are below 2^12.
+    let body = "    var random = start_random(invocation);
+    pixel = choose_pixel(first_random_2(&random), random);
+    let number = f32(random.index & 0xfffu) / 4096.0;
+    radiance = vec3f(number, number * number, 0.0);";
+    let imports = "import package::sampling::random::{start_random, first_random_2};
+import package::sampling::distribution::choose_pixel;";
+    instead_of_paths(&mut renderer, plant, [imports, "", body]);
+    renderer.set_scene(&scenes::empty(Vec3::ONE)).unwrap();
+    for samples in batches {
+        renderer.render(StopCondition::Samples(*samples), |_| true).unwrap();
+    }
+    let film = renderer.snapshot().unwrap();
+    let gaze = Vec3::new(0.3, 0.2, -1.0).normalize();
+    let near = film.pixels().enumerate().filter(|(i, _)| {
+        let i = *i as u32;
+        film_direction(&WIDE_FILM, i % WIDE_FILM.width, i / WIDE_FILM.width).angle_between(gaze) < 5f32.to_radians()
+    });
+    near.map(|(_, pixel)| {
+        let n = f64::from(pixel.samples);
+        [n, pixel.mean[0] * n * 4096.0, pixel.mean[1] * n * 4096.0 * 4096.0]
+    })
+    .collect()
+}
+
+/// Whether the samples of most pixels are numbered 0, 1, 2, ... without gap or repetition, by the sums of numbers and of squares.
+/// All but those at the table's rim, which samples from outside it reach too.
+fn share_numbered(pixels: &[[f64; 3]]) -> f64 {
+    let numbered = pixels.iter().filter(|[n, sum, squares]| {
+        let (of_numbers, of_squares) = (n * (n - 1.0) / 2.0, (n - 1.0) * n * (2.0 * n - 1.0) / 6.0);
+        *n > 8.0 && (sum - of_numbers).abs() < 0.01 && (squares - of_squares).abs() < 0.5
+    });
+    numbered.count() as f64 / pixels.len() as f64
+}
+
+#[test]
+fn samples_of_a_pixel_near_the_gaze_are_numbered() {
+    let _time = device::Stopwatch::start("numbers in the fovea");
+    let samples = 150_000;
+    let pixels = numbers_in_pixels(&[samples], Clone::clone);
+    eprintln!(
+        "{} pixels, {:.1} samples each",
+        pixels.len(),
+        pixels.iter().map(|p| p[0]).sum::<f64>() / pixels.len() as f64
+    );
+    assert!(pixels.len() > 100);
+    assert_eq!(share_numbered(&pixels), 1.0);
+    // However the render was cut.
+    assert_eq!(numbers_in_pixels(&[1 << 12, 70_001, samples], Clone::clone), pixels);
+    // Numbers of the strata about the gaze, which pixels cut through.
+    let strata = numbers_in_pixels(&[samples], |sources| {
+        exchanged(
+            sources,
+            "sampling::random",
+            &[("(*state).index = number_in_pixel(entry, global.index);", "(*state).index += 0u;")],
+        )
+    });
+    assert!(share_numbered(&strata) < 0.05, "{}", share_numbered(&strata));
 }

@@ -1,8 +1,8 @@
 //! Seeded low-discrepancy points by global index: Owen-scrambled Sobol, and independent points for statistics.
 //!
 //! A point is a pure function of `(index, dimension, seed)`, so that a sample does not depend on how the work was cut into
-//! batches. Use: dimensions 0 and 1 choose the direction about the gaze; the place inside the pixel and the path come from
-//! [`shuffled_pair`]s of the sample's stratum, since the samples of one pixel are far apart in the sequence of all.
+//! batches. Use: dimensions 0 and 1 choose the direction about the gaze; the place inside the pixel is a [`shuffled_pair`] and the path
+//! comes from [`vertex_numbers`] of the sample's pixel or stratum, since the samples of one pixel are far apart in the sequence of all.
 //!
 //! # Numerics
 //! Values are `u32` fractions of 2^32; [`to_unit_f32`] keeps the top 24 bits, so that the f32 is exact and below 1. The
@@ -134,6 +134,64 @@ pub fn shuffled_pair(index: u32, pair: u32, seed: u32) -> [u32; 2] {
     [owen_scramble(x, hash(seed ^ 0x68bc_21eb)), owen_scramble(y, hash(seed ^ 0x02e5_be93))]
 }
 
+/// Four dimensions that are well distributed together: of every aligned run of `4^k` points one lies in each box whose sides are `4^-a`,
+/// `4^-b`, `4^-c` and `4^-d` with `a + b + c + d = k`. No base 2 sequence of four dimensions has this.
+///
+/// # Formula
+/// Faure's sequence over the field of four elements: digit `i` of dimension `alpha` is the sum over `j` of
+/// `binomial(j, i) alpha^(j - i)` times digit `j` of the index, in base 4. By Lucas the matrix is a Kronecker power of
+/// `[[1, alpha], [0, 1]]`, so a dimension takes four steps and no table.
+///
+/// # Numerics
+/// Fractions of 2^32, exact.
+///
+/// # Reference
+/// H. Faure, *Discrépance de suites associées à un système de numération (en dimension s)*, Acta Arithmetica 41, 1982;
+/// H. Niederreiter, *Point sets and sequences with small discrepancy*, Monatshefte für Mathematik 104, 1987 (prime powers).
+#[must_use]
+pub fn faure_quad(index: u32) -> [u32; 4] {
+    /// Places whose number has bit 0, 1, 2 and 3, from the lowest digit, which is place 15.
+    const PLACES: [u32; 4] = [0x3333_3333, 0x0f0f_0f0f, 0x00ff_00ff, 0x0000_ffff];
+    // Elements 2 and 3 of the field, times each of 16 digits.
+    let twice = |x: u32| {
+        let (high, low) = (x >> 1 & 0x5555_5555, x & 0x5555_5555);
+        (high ^ low) << 1 | high
+    };
+    let thrice = |x: u32| x ^ twice(x);
+    let x = index.reverse_bits();
+    let mut point = [x; 4];
+    for (step, places) in PLACES.into_iter().enumerate() {
+        let (shift, is_squared) = (2 << step, step % 2 == 1);
+        point[1] ^= (point[1] & places) << shift;
+        let [third, fourth] = [point[2] & places, point[3] & places];
+        // Powers of either element take turns with the other.
+        let factors = if is_squared { [thrice(third), twice(fourth)] } else { [twice(third), thrice(fourth)] };
+        point[2] ^= factors[0] << shift;
+        point[3] ^= factors[1] << shift;
+    }
+    point
+}
+
+/// Numbers for the vertex of a path, fractions of 2^32: two to choose a point on a light and two to choose a direction.
+///
+/// Vertices go in twos: both numbers of the first are well distributed together with either's of the second ([`faure_quad`] on the
+/// index in an order of the two vertices' own, Owen-scrambled), since the light that reaches a pixel over a vertex depends on the one
+/// before. At one vertex the point on the light and the direction have the same point of the sequence, with scrambles of their own: over seeds
+/// they are uncorrelated, and each is stratified. Pairs of vertices are independent, and there is no end of them.
+#[must_use]
+pub fn vertex_numbers(index: u32, vertex: u32, seed: u32) -> [u32; 4] {
+    let shuffle = hash_combine(seed, 0x5eed_0000 + vertex / 2);
+    let point = faure_quad(owen_scramble(index, shuffle));
+    let [a, b] = if vertex % 2 == 0 { [point[0], point[1]] } else { [point[2], point[3]] };
+    let scramble = hash_combine(shuffle, vertex % 2);
+    [
+        owen_scramble(a, hash(scramble ^ 0x68bc_21eb)),
+        owen_scramble(b, hash(scramble ^ 0x02e5_be93)),
+        owen_scramble(a, hash(scramble ^ 0x967a_889b)),
+        owen_scramble(b, hash(scramble ^ 0x368c_c8b7)),
+    ]
+}
+
 /// Independent points: a hash of `(index, dimension, seed)`, a fraction of 2^32. For statistics and as the baseline.
 #[must_use]
 pub fn independent(index: u32, dimension: u32, seed: u32) -> u32 {
@@ -151,6 +209,65 @@ pub fn owen_scramble(value: u32, seed: u32) -> u32 {
     x ^= x.wrapping_mul(0xc7af_e638);
     x ^= x.wrapping_mul(0x8d22_f6e6);
     x.reverse_bits()
+}
+
+/// The inverse of [`owen_scramble`]: the value whose scramble by `seed` this is.
+#[must_use]
+pub fn owen_unscramble(value: u32, seed: u32) -> u32 {
+    // `factor` is even: each turn makes one more low bit right at least, and as many as the factor has zeros at its end.
+    let undo = |y: u32, factor: u32| {
+        let turns = 32 / factor.trailing_zeros();
+        (0..turns).fold(y, |x, _| y ^ x.wrapping_mul(factor))
+    };
+    let mut x = value.reverse_bits();
+    for factor in [0x8d22_f6e6, 0xc7af_e638, 0xb82f_1e52, 0x6c50_b47c] {
+        x = undo(x, factor);
+    }
+    x.wrapping_sub(seed).reverse_bits()
+}
+
+/// How many of the first points of a scrambled sequence have a first number below a bound: which number a point has among those in
+/// an interval, without having seen the others.
+///
+/// # Definition
+/// The `i`-th first number is `owen_scramble(sobol(i, 0), seed)`. [`Below::count`] is the number of `i < index` with a first number
+/// below [`Below::bound`].
+///
+/// # Formula
+/// Numbers below the bound share its first `k` bits for some `k` and have a 0 where it has a 1. In van der Corput's sequence, scrambled
+/// or not, they are those whose indices have one residue modulo `2^(k + 1)`; the residues are read off the index at which the
+/// sequence takes the bound itself, [`Below::root`].
+///
+/// # Numerics
+/// Integers: exact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Below {
+    /// A fraction of 2^32.
+    pub bound: u32,
+    /// The index whose first number is the bound.
+    pub root: u32,
+}
+
+impl Below {
+    /// The bound in the sequence that `seed` scrambles.
+    #[must_use]
+    pub fn new(bound: u32, seed: u32) -> Self {
+        Self { bound, root: owen_unscramble(bound, seed).reverse_bits() }
+    }
+
+    /// How many of the first `index` first numbers are below the bound.
+    #[must_use]
+    pub fn count(self, index: u32) -> u32 {
+        (0..BITS as u32)
+            .filter(|bit| self.bound >> (31 - bit) & 1 == 1)
+            .map(|bit| {
+                let lower = u32::MAX >> (31 - bit);
+                let residue = (self.root ^ (1 << bit)) & lower;
+                // Whole periods of 2^(bit + 1) indices hold one each.
+                (u64::from(index) >> (bit + 1)) as u32 + u32::from(index & lower > residue)
+            })
+            .sum()
+    }
 }
 
 /// A hash of two words.

@@ -167,8 +167,8 @@ fn gaze_frame(n: vec3<f32>) -> mat3x3<f32> {
 }
 ";
 
-/// WGSL of [`crate::sequence`]: `hash_u32`, `hash_combine`, `owen_scramble`, `sobol_pair`, `shuffled_pair`, `independent_u32`,
-/// `to_unit`, `strata_order`.
+/// WGSL of [`crate::sequence`]: `hash_u32`, `hash_combine`, `owen_scramble`, `sobol_pair`, `shuffled_pair`, `vertex_numbers`,
+/// `count_below`, `independent_u32`, `to_unit`, `strata_order`.
 #[must_use]
 pub fn sequence_module() -> String {
     String::from(
@@ -218,6 +218,67 @@ fn shuffled_pair(index: u32, pair: u32, seed: u32) -> vec2<u32> {
         owen_scramble(point.x, hash_u32(seed_of_pair ^ 0x68bc21ebu)),
         owen_scramble(point.y, hash_u32(seed_of_pair ^ 0x02e5be93u)),
     );
+}
+
+// Elements 2 and 3 of the field of four times each of 16 digits.
+fn twice(x: u32) -> u32 {
+    let high = (x >> 1u) & 0x55555555u;
+    let low = x & 0x55555555u;
+    return ((high ^ low) << 1u) | high;
+}
+
+fn thrice(x: u32) -> u32 {
+    return x ^ twice(x);
+}
+
+// Dimensions 0 and 1 of Faure's sequence in base 4, or 2 and 3.
+fn faure_half(index: u32, is_second: bool) -> vec2<u32> {
+    let x = reverseBits(index);
+    var a = x;
+    var b = x;
+    if is_second {
+        a = a ^ (twice(a & 0x33333333u) << 2u);
+        b = b ^ (thrice(b & 0x33333333u) << 2u);
+        a = a ^ (thrice(a & 0x0f0f0f0fu) << 4u);
+        b = b ^ (twice(b & 0x0f0f0f0fu) << 4u);
+        a = a ^ (twice(a & 0x00ff00ffu) << 8u);
+        b = b ^ (thrice(b & 0x00ff00ffu) << 8u);
+        a = a ^ (thrice(a & 0x0000ffffu) << 16u);
+        b = b ^ (twice(b & 0x0000ffffu) << 16u);
+    } else {
+        b = b ^ ((b & 0x33333333u) << 2u);
+        b = b ^ ((b & 0x0f0f0f0fu) << 4u);
+        b = b ^ ((b & 0x00ff00ffu) << 8u);
+        b = b ^ (b << 16u);
+    }
+    return vec2<u32>(a, b);
+}
+
+// Numbers of a path's vertex: two for a light, two for a direction; vertices go in twos.
+fn vertex_numbers(index: u32, vertex: u32, seed: u32) -> vec4<u32> {
+    let shuffle = hash_combine(seed, 0x5eed0000u + vertex / 2u);
+    let is_second = (vertex & 1u) == 1u;
+    let point = faure_half(owen_scramble(index, shuffle), is_second);
+    let scramble = hash_combine(shuffle, vertex & 1u);
+    return vec4<u32>(
+        owen_scramble(point.x, hash_u32(scramble ^ 0x68bc21ebu)),
+        owen_scramble(point.y, hash_u32(scramble ^ 0x02e5be93u)),
+        owen_scramble(point.x, hash_u32(scramble ^ 0x967a889bu)),
+        owen_scramble(point.y, hash_u32(scramble ^ 0x368cc8b7u)),
+    );
+}
+
+// How many of the first `index` points have a first number below `bound`, whose 8 low bits are 0; `root` is the index at which the
+// sequence takes the bound (fovea_sampler::sequence::Below).
+fn count_below(index: u32, bound: u32, root: u32) -> u32 {
+    var count = 0u;
+    for (var bit = 0u; bit < 24u; bit = bit + 1u) {
+        let lower = 0xffffffffu >> (31u - bit);
+        let residue = (root ^ (1u << bit)) & lower;
+        let below = ((index >> bit) >> 1u) + select(0u, 1u, (index & lower) > residue);
+        count = count + select(0u, below, ((bound >> (31u - bit)) & 1u) == 1u);
+    }
+    return count;
 }
 
 // Independent numbers: a hash of all three.

@@ -9,6 +9,10 @@ use fovea_sampler::Inverse;
 use glam::{Mat3, Quat, Vec2, Vec3};
 use rayon::prelude::*;
 
+mod fovea;
+
+use fovea::Fovea;
+
 use crate::{
     film::{FilmMapping, FilmOptions},
     kernels::layout::{self, MAX_LAYERS, SampleLayer, codes},
@@ -244,24 +248,80 @@ impl Distribution {
         }
     }
 
-    /// The mixture as the kernels consume it: layers, their number, and the pixel list.
-    pub(crate) fn encode(&self) -> ([SampleLayer; MAX_LAYERS], u32, Vec<u32>) {
+    /// The mixture as the kernels consume it. With `fovea`, pixels about the gaze get a table where there can be one.
+    pub(crate) fn encode(&self, fovea: Option<FilmFrame<'_>>) -> Encoded {
         let sum: f32 = self.layers.iter().map(|(weight, _)| weight).sum();
-        let mut encoded = [bytemuck::Zeroable::zeroed(); MAX_LAYERS];
-        let mut pixels = Vec::new();
-        let mut cumulative = 0.0;
-        for ((weight, layer), out) in self.layers.iter().zip(&mut encoded) {
-            let share = weight / sum;
-            cumulative += share;
-            *out = encode_layer(layer, &mut pixels);
-            out.share = share;
-            out.cumulative = cumulative;
+        let foveas = fovea.map(|film| self.foveas(film)).unwrap_or_default();
+        let foveal = |layer: usize| foveas.iter().flat_map(|of_gaze| &of_gaze.parts).find(|part| part.layer == layer);
+        let share = |layer: usize| f64::from(self.layers[layer].0 / sum);
+        let mut encoded = Encoded {
+            layers: bytemuck::Zeroable::zeroed(),
+            layer_count: self.layers.len().min(MAX_LAYERS) as u32,
+            pixels: Vec::new(),
+            fovea: Vec::new(),
+            fovea_end: 0,
+        };
+        let mut tabled = 0.0;
+        for of_gaze in &foveas {
+            let own: f64 = of_gaze.parts.iter().map(|part| share(part.layer) * part.share).sum();
+            encoded.fovea.extend(of_gaze.pixels.intervals(tabled, own));
+            tabled += own;
         }
-        (encoded, self.layers.len().min(MAX_LAYERS) as u32, pixels)
+        // A multiple of 2^8: floats of 24 bits tell the table from the layers.
+        encoded.fovea_end = (tabled * 2f64.powi(24)).round() as u32 * 256;
+        let mut cumulative = f64::from(encoded.fovea_end) * 2f64.powi(-32);
+        let rest = (1.0 - cumulative) / (1.0 - tabled);
+        for (at, (layer, out)) in self.layers.iter().map(|(_, layer)| layer).zip(&mut encoded.layers).enumerate() {
+            let part = foveal(at);
+            let own = share(at) * (1.0 - part.map_or(0.0, |part| part.share)) * rest;
+            cumulative += own;
+            *out = encode_layer(layer, part.map_or(0.0, |part| part.radius_end), &mut encoded.pixels);
+            out.share = own as f32;
+            out.cumulative = cumulative as f32;
+        }
+        encoded
+    }
+
+    /// The foveas of the mixture's acuity layers, one a gaze.
+    fn foveas(&self, film: FilmFrame<'_>) -> Vec<Fovea> {
+        let mut foveas: Vec<Fovea> = Vec::new();
+        for (at, (_, layer)) in self.layers.iter().enumerate() {
+            let Layer::Acuity { gaze, clip, radius_scale } = layer else { continue };
+            let known = foveas.iter().position(|fovea| fovea.gaze == *gaze);
+            let Some(fovea) = known.or_else(|| {
+                foveas.push(Fovea::new(*gaze, &self.inverse, film)?);
+                Some(foveas.len() - 1)
+            }) else {
+                continue;
+            };
+            foveas[fovea].take_from(at, clip.as_ref(), *radius_scale, &self.inverse);
+        }
+        foveas
     }
 }
 
-fn encode_layer(layer: &Layer, pixels: &mut Vec<u32>) -> SampleLayer {
+/// A film, and how it is turned.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FilmFrame<'a> {
+    pub options: &'a FilmOptions,
+    pub world_from_film: Quat,
+}
+
+/// A mixture as the kernels consume it.
+#[derive(Debug)]
+pub(crate) struct Encoded {
+    pub layers: [SampleLayer; MAX_LAYERS],
+    pub layer_count: u32,
+    /// The layers' lists.
+    pub pixels: Vec<u32>,
+    /// Lower ends of intervals of the first random number, fractions of 2^32 and multiples of 2^8, with the pixels about the gaze.
+    pub fovea: Vec<(u32, u32)>,
+    /// Where the last of those intervals ends; 0 without.
+    pub fovea_end: u32,
+}
+
+/// `taken`: the part of the radial inverse's range from 0 that is not the layer's.
+fn encode_layer(layer: &Layer, taken: f32, pixels: &mut Vec<u32>) -> SampleLayer {
     let mut out: SampleLayer = bytemuck::Zeroable::zeroed();
     out.clip_tries = 1;
     match layer {
@@ -279,7 +339,7 @@ fn encode_layer(layer: &Layer, pixels: &mut Vec<u32>) -> SampleLayer {
             pixels.extend_from_slice(list);
         }
         Layer::Acuity { gaze, clip, radius_scale } => {
-            out.radius_scale = *radius_scale;
+            (out.radius_first, out.radius_size) = (taken, radius_scale - taken);
             match gaze {
                 Gaze::Scene { direction } => {
                     out.kind = codes::LAYER_GAZE;
@@ -328,8 +388,12 @@ fn pixels_in_view(film: &FilmOptions, world_from_film: Quat, view: &View) -> Arc
 
 /// Direction, in the film's frame, of a pixel's centre.
 pub fn film_direction(film: &FilmOptions, x: u32, y: u32) -> Vec3 {
-    let u = (f64::from(x) + 0.5) / f64::from(film.width);
-    let v = (f64::from(y) + 0.5) / f64::from(film.height);
+    place_direction(film, f64::from(x) + 0.5, f64::from(y) + 0.5)
+}
+
+/// Direction, in the film's frame, of a place on it in pixels from its top left corner.
+fn place_direction(film: &FilmOptions, x: f64, y: f64) -> Vec3 {
+    let (u, v) = (x / f64::from(film.width), y / f64::from(film.height));
     match film.mapping {
         FilmMapping::Equirect => {
             let (sin_lon, cos_lon) = (std::f64::consts::TAU * (u - 0.5)).sin_cos();

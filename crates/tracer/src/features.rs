@@ -33,6 +33,8 @@ features! {
     /// The geometry's tables are texture pages instead of storage buffers: one is larger than a binding, or the driver reads
     /// textures faster.
     GeometryTextures = "GEOMETRY_TEXTURES",
+    /// Workgroups are dealt to the adapter's threads, which would otherwise take runs of them.
+    DealtGroups = "DEALT_GROUPS",
     /// Some instance has alpha mask or blend: candidates pass an alpha test.
     Alpha = "ALPHA",
     /// Some material has a texture.
@@ -95,6 +97,7 @@ impl Feature {
             Self::Instances
                 | Self::BinaryNodes
                 | Self::GeometryTextures
+                | Self::DealtGroups
                 | Self::EnvironmentImage
                 | Self::PerspectiveFilm
                 | Self::Guided

@@ -265,6 +265,11 @@ impl Gpu {
         self.info.driver == "llvmpipe"
     }
 
+    /// Whether each of the adapter's threads takes one run of a dispatch's workgroups: lavapipe divides them beforehand.
+    pub(crate) fn takes_runs_of_workgroups(&self) -> bool {
+        self.is_lavapipe()
+    }
+
     /// Whether this is lavapipe of Mesa 22, where much measures otherwise than in later ones.
     pub(crate) fn is_lavapipe_22(&self) -> bool {
         self.is_lavapipe() && self.info.driver_info.starts_with("Mesa 22.")

@@ -21,6 +21,8 @@ pub mod pipelines;
 
 /// Threads of a workgroup in every one-dimensional kernel.
 pub const WORKGROUP_SIZE: u32 = 64;
+/// Runs into which the workgroups of one dispatch are dealt where an adapter's threads take runs: a multiple of what threads there are.
+pub const GROUP_HANDS: u32 = 16;
 /// Threads of a workgroup along each axis of the view kernels.
 pub const TILE_SIZE: u32 = 8;
 /// 32-bit words of a film pixel: R, G, B (64 bits each), samples, sum of squared luminance (96 bits).
@@ -47,6 +49,7 @@ const MODULES: &[(&str, &str)] = &[
     ("path_bindings", include_str!("../../../shaders/path_bindings.wesl")),
     ("sampling::random", include_str!("../../../shaders/sampling/random.wesl")),
     ("sampling::distribution", include_str!("../../../shaders/sampling/distribution.wesl")),
+    ("sampling::fovea", include_str!("../../../shaders/sampling/fovea.wesl")),
     ("sampling::guide", include_str!("../../../shaders/sampling/guide.wesl")),
     ("sampling::noise", include_str!("../../../shaders/sampling/noise.wesl")),
     ("film::mapping", include_str!("../../../shaders/film/mapping.wesl")),
@@ -66,9 +69,11 @@ const MODULES: &[(&str, &str)] = &[
     ("shading::sheen", include_str!("../../../shaders/shading/sheen.wesl")),
     ("shading::tables", include_str!("../../../shaders/shading/tables.wesl")),
     ("shading::bsdf", include_str!("../../../shaders/shading/bsdf.wesl")),
+    ("light::choice", include_str!("../../../shaders/light/choice.wesl")),
     ("light::weights", include_str!("../../../shaders/light/weights.wesl")),
     ("light::environment", include_str!("../../../shaders/light/environment.wesl")),
     ("light::emitters", include_str!("../../../shaders/light/emitters.wesl")),
+    ("path::invocation", include_str!("../../../shaders/path/invocation.wesl")),
     ("path::trace", include_str!("../../../shaders/path/trace.wesl")),
     ("path::shade", include_str!("../../../shaders/path/shade.wesl")),
     ("path::start", include_str!("../../../shaders/path/start.wesl")),
@@ -260,6 +265,11 @@ impl Kernel {
         matches!(self, Self::Trace | Self::Extend | Self::Shade)
     }
 
+    /// Whether workgroups are one after the other over rays or samples, of which some take far longer than others.
+    pub const fn has_uneven_workgroups(self) -> bool {
+        matches!(self, Self::Trace | Self::Query | Self::Generate)
+    }
+
     /// Name of the entry point (the fragment entry where the kernel draws).
     pub const fn entry_point(self) -> &'static str {
         match self {
@@ -425,6 +435,7 @@ fn constants_module(c: &KernelConstants) -> String {
     let numbers = [
         ("WORKGROUP_SIZE", WORKGROUP_SIZE),
         ("TILE_SIZE", TILE_SIZE),
+        ("GROUP_HANDS", GROUP_HANDS),
         ("FILM_WORDS", FILM_WORDS),
         ("TEXEL_PAGE_BITS", TEXEL_PAGE_BITS),
         ("ALBEDO_COLUMNS", ALBEDO_COLUMNS),

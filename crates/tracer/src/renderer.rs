@@ -15,6 +15,7 @@ mod panorama;
 mod query;
 mod rehearsal;
 mod restore;
+mod sampling;
 mod schedule;
 mod sketch;
 mod split;
@@ -122,6 +123,7 @@ pub struct Renderer {
     /// Counts the scenes that were set.
     scene_version: u64,
     adaptive: adaptive::Adaptive,
+    sampling: sampling::Sampling,
     view: ViewRenderer,
 }
 
@@ -147,7 +149,7 @@ impl Renderer {
             wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
         );
         let sources = Arc::new(ShaderSources::new(distribution.inverse()));
-        let mut renderer = Self {
+        Ok(Self {
             view: ViewRenderer::new(gpu),
             pixel_list: buffer("pixel list", 16, wgpu::BufferUsages::STORAGE),
             gpu: gpu.clone(),
@@ -173,9 +175,8 @@ impl Renderer {
             scene_hash: ContentHash::default(),
             scene_version: 0,
             adaptive: adaptive::Adaptive::default(),
-        };
-        renderer.upload_pixel_list();
-        Ok(renderer)
+            sampling: sampling::Sampling::default(),
+        })
     }
 
     /// Builds hierarchies of another kind than what measured faster on the adapter, from the next scene on.
@@ -270,7 +271,7 @@ impl Renderer {
             }
         }
         self.drop_guide();
-        self.upload_pixel_list();
+        self.sampling.forget();
         Ok(())
     }
 
@@ -512,7 +513,9 @@ impl Renderer {
         };
         KernelKey {
             kernel,
-            features: features.with(Feature::PerspectiveFilm, perspective),
+            features: features
+                .with(Feature::PerspectiveFilm, perspective)
+                .with(Feature::DealtGroups, self.gpu.takes_runs_of_workgroups() && kernel.has_uneven_workgroups()),
             constants: if kernel.traces_paths() || matches!(kernel, Kernel::Query | Kernel::FirstHit) {
                 scene.map(|s| s.constants).unwrap_or_default()
             } else {

@@ -1,8 +1,8 @@
 //! The sequences: their structure, their scrambling, and what they gain over independent points.
 
 use fovea_sampler::sequence::{
-    DIMENSIONS, direction_numbers, hash_combine, independent, owen_scramble, shuffled_pair, sobol, sobol_owen,
-    sobol_pair, strata_order, to_unit_f32,
+    Below, DIMENSIONS, direction_numbers, faure_quad, hash_combine, independent, owen_scramble, owen_unscramble,
+    shuffled_pair, sobol, sobol_owen, sobol_pair, strata_order, to_unit_f32, vertex_numbers,
 };
 use fovea_sampler::{Angle, Film, GazeWarp, Geometry, RadialDistribution, Reddy2001};
 
@@ -168,3 +168,114 @@ fn sobol_evens_out_the_samples_in_the_fovea() {
     assert!((poisson / mean - 1.0).abs() < 0.15, "{poisson} of {mean}");
     assert!(even < 0.35 * poisson, "{even} against {poisson} at {mean} samples a pixel");
 }
+
+#[test]
+fn unscrambling_undoes_scrambling() {
+    let values = (0..32).map(|bit| 1 << bit).chain(0..1 << 12).chain([u32::MAX, 0xdead_beef]);
+    for (value, seed) in values.flat_map(|value| [0, 1, 0x9e37_79b9, u32::MAX].map(|seed| (value, seed))) {
+        assert_eq!(owen_unscramble(owen_scramble(value, seed), seed), value, "{value:x} by {seed:x}");
+        assert_eq!(owen_scramble(owen_unscramble(value, seed), seed), value, "{value:x} by {seed:x}");
+    }
+}
+
+/// Against counting; and for large indices, whole periods and the last index there is.
+#[test]
+fn points_below_a_bound_are_counted_without_seeing_them() {
+    let bounds = [0, 1, 0x100, 0x18b2_a400, 0x7fff_ffff, 0x8000_0000, 0xdead_beef, u32::MAX];
+    for (bound, seed) in bounds.into_iter().flat_map(|bound| [0, 7, 0xdead_beef].map(|seed| (bound, seed))) {
+        let below = Below::new(bound, seed);
+        assert_eq!(sobol_owen_first(below.root, seed), bound);
+        let mut counted = 0;
+        for index in 0..3000 {
+            assert_eq!(below.count(index), counted, "{bound:x}, seed {seed:x}, index {index}");
+            counted += u32::from(sobol_owen_first(index, seed) < bound);
+        }
+        // Each whole period of 2^k points has one in each interval of 2^-k.
+        let cell = Below::new(bound & 0xfff0_0000, seed);
+        assert_eq!(cell.count(5 << 12), 5 * (cell.bound >> 20));
+        assert!(u64::from(Below::new(bound, seed).count(u32::MAX)).abs_diff(u64::from(bound)) <= 1);
+    }
+}
+
+fn sobol_owen_first(index: u32, seed: u32) -> u32 {
+    owen_scramble(sobol(index, 0), seed)
+}
+
+/// Boxes of four sides `4^-digits[k]` that together have volume `4^-sum`.
+fn boxes(sum: u32) -> impl Iterator<Item = [u32; 4]> {
+    let all = (0..(sum + 1).pow(3)).map(move |i| [i % (sum + 1), i / (sum + 1) % (sum + 1), i / (sum + 1).pow(2)]);
+    all.filter(move |d| d.iter().sum::<u32>() <= sum).map(move |[a, b, c]| [a, b, c, sum - a - b - c])
+}
+
+/// Whether 4^k points have one in each box of every shape.
+fn is_net(k: u32, point: impl Fn(u32) -> [u32; 4]) -> bool {
+    boxes(k).all(|digits| {
+        let mut seen = vec![false; 1 << (2 * k)];
+        (0..1 << (2 * k)).all(|i| {
+            let cell = point(i)
+                .into_iter()
+                .zip(digits)
+                .fold(0_u64, |cell, (x, d)| (cell << (2 * d)) | (u64::from(x) >> (32 - 2 * d)));
+            !core::mem::replace(&mut seen[cell as usize], true)
+        })
+    })
+}
+
+#[test]
+fn four_dimensions_are_a_net_in_base_4() {
+    for (k, start) in [(1, 0), (2, 0), (3, 0), (3, 5), (4, 0), (4, 3), (5, 1)] {
+        assert!(is_net(k, |i| faure_quad(i + (start << (2 * k)))), "4^{k} from {start}");
+    }
+    // Sobol's first four dimensions are none, and the test sees it.
+    assert!(!is_net(2, |i| [0, 1, 2, 3].map(|d| sobol(i, d))));
+    // The first point of the second run of 4^15 differs from the first of all: all digits take part.
+    assert_ne!(faure_quad(1 << 30), faure_quad(0));
+}
+
+/// Directions of the first of two vertices with the light's point, or the direction, of the second.
+#[test]
+fn numbers_of_two_vertices_are_a_net_together() {
+    for (first, seed) in [(0, 1), (2, 0xdead_beef), (1000, 7)] {
+        for numbers_of_second in [0, 2] {
+            let together = |i: u32| {
+                let [.., a, b] = vertex_numbers(i + (3 << 6), first, seed);
+                let second = vertex_numbers(i + (3 << 6), first + 1, seed);
+                [a, b, second[numbers_of_second], second[numbers_of_second + 1]]
+            };
+            assert!(is_net(3, together), "vertices {first} and {}", first + 1);
+        }
+    }
+}
+
+/// Over seeds, a product of a function of the light's numbers and one of the direction's has the product of their means.
+#[test]
+fn light_and_direction_of_a_vertex_are_uncorrelated() {
+    for vertex in [0, 1, 4] {
+        let (mut sum, mut squares) = (0.0, 0.0);
+        let runs = 4096;
+        for seed in 0..runs {
+            let covariance: f64 = (0..16)
+                .map(|i| {
+                    let [a, _, c, _] = vertex_numbers(i, vertex, seed).map(|x| f64::from(x) / 2f64.powi(32) - 0.5);
+                    12.0 * a * c / 16.0
+                })
+                .sum();
+            (sum, squares) = (sum + covariance, squares + covariance * covariance);
+        }
+        let error = squares.sqrt() / f64::from(runs);
+        let mean = sum / f64::from(runs);
+        // In one run both may be in much the same order, or in the opposite one; alike in every run, the mean would be 1.
+        assert!(error < 0.02 && mean.abs() < 3.5 * error, "vertex {vertex}: {mean} +- {error}");
+    }
+}
+
+/// Pinned: films that are to be resumed depend on every bit.
+#[test]
+fn numbers_of_vertices_are_stable() {
+    assert_eq!([vertex_numbers(5, 0, 1), vertex_numbers(0xdead_beef, 3, 42)], PINNED);
+}
+
+const PINNED: [[u32; 4]; 2] = [
+    [3_542_360_847, 2_069_833_860, 3_235_612_565, 3_534_767_642],
+    [1_453_414_244, 4_103_960_274, 2_936_911_716, 816_154_599],
+];

@@ -68,8 +68,9 @@ shared! {
         clip_half_extent: [f32; 2],
         list_first: u32,
         list_count: u32,
-        radius_scale: f32,
-        pad_0: [u32; 3],
+        radius_first: f32,
+        radius_size: f32,
+        pad_0: [u32; 2],
         world_from_clip: Columns3,
     }
 
@@ -99,6 +100,10 @@ shared! {
         stratum_bits: [u32; 2],
         guide_first: u32,
         guide_rows: u32,
+        fovea_end: u32,
+        fovea_first: u32,
+        fovea_count: u32,
+        pad_0: u32,
         order: [[u32; 4]; 5],
         layers: [SampleLayer; MAX_LAYERS],
     }
@@ -127,7 +132,7 @@ shared! {
         throughput: [f32; 3],
         random_index: u32,
         random_seed: u32,
-        random_pair: u32,
+        random_vertex: u32,
         hit_t: f32,
         hit_instance: u32,
         hit_barycentrics: [f32; 2],

@@ -45,7 +45,7 @@ impl Renderer {
     /// of adaptive sampling changes. As long as the guide does not depend on samples of this film, its means stay unbiased.
     pub fn set_guide(&mut self, guide: Option<Guide>) {
         (self.adaptive.guide, self.adaptive.is_own) = (guide, false);
-        self.upload_pixel_list();
+        self.sampling.forget();
     }
 
     /// How samples are moved between the cells of the distribution's unit square, where they are.
@@ -105,7 +105,7 @@ impl Renderer {
         (self.adaptive.guide, self.adaptive.is_own) = (guide, true);
         let done = self.samples - since;
         self.adaptive.next = Some(since + if done < first { first } else { (2 * done).next_power_of_two() });
-        self.upload_pixel_list();
+        self.sampling.forget();
         Ok(())
     }
 
@@ -126,7 +126,7 @@ impl Renderer {
     pub(super) fn drop_guide(&mut self) {
         (self.adaptive.since, self.adaptive.next) = (self.samples, None);
         if self.adaptive.guide.take().is_some() {
-            self.upload_pixel_list();
+            self.sampling.forget();
         }
     }
 }

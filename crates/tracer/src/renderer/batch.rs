@@ -35,12 +35,13 @@ impl Renderer {
         (2f32.powi(38 - exponent), 2f32.powi(32 - exponent))
     }
 
-    pub(super) fn write_params(&self, samples: u32) -> Result<(), RenderError> {
+    pub(super) fn write_params(&mut self, samples: u32) -> Result<(), RenderError> {
         self.write_guided_params(samples, self.guide().map_or(0, Guide::rows))
     }
 
     /// The unit square has so many rows of cells; 0 without a guide.
-    pub(super) fn write_guided_params(&self, samples: u32, guide_rows: u32) -> Result<(), RenderError> {
+    pub(super) fn write_guided_params(&mut self, samples: u32, guide_rows: u32) -> Result<(), RenderError> {
+        self.prepare_sampling(guide_rows != 0);
         let params = BatchParams { guide_rows, ..self.batch_params(samples)? };
         for (slab, buffer) in self.film.slabs.iter().zip(&self.params) {
             let params =
@@ -58,7 +59,7 @@ impl Renderer {
     /// Of the next batch, but for the slab and the guide.
     pub(super) fn batch_params(&self, samples: u32) -> Result<BatchParams, RenderError> {
         let scene = self.scene.as_ref().ok_or(RenderError::NoScene)?;
-        let (layers, layer_count, pixels) = self.distribution.encode();
+        let sampling = &self.sampling;
         let first = self.next_sample;
         let (radiance_scale, luminance_scale) = self.film_scales();
         let columns = order_columns(samples.max(1).ilog2());
@@ -82,37 +83,20 @@ impl Renderer {
             slab_pixel_count: 0,
             radiance_scale,
             luminance_scale,
-            layer_count,
+            layer_count: sampling.layer_count,
             use_sobol: u32::from(self.options.sequence == SequenceKind::Sobol),
             backdrop: scene.backdrop.unwrap_or_default().to_array(),
             has_backdrop: u32::from(scene.backdrop.is_some()),
             stratum_bits: self.distribution.stratum_bits(&self.options.film),
-            guide_first: pixels.len() as u32,
+            guide_first: sampling.guide_first,
             guide_rows: 0,
+            fovea_end: sampling.fovea_end,
+            fovea_first: sampling.fovea_first,
+            fovea_count: sampling.fovea_count,
+            pad_0: 0,
             order,
-            layers,
+            layers: sampling.layers,
         })
-    }
-
-    pub(super) fn upload_pixel_list(&mut self) {
-        let (_, _, mut pixels) = self.distribution.encode();
-        pixels.extend(self.guide().into_iter().flat_map(Guide::table).map(|bound| bound.to_bits()));
-        if pixels.is_empty() {
-            return;
-        }
-        let bytes: &[u8] = bytemuck::cast_slice(&pixels);
-        if self.pixel_list.size() < bytes.len() as u64 {
-            self.pixel_list = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("pixel list"),
-                size: bytes.len() as u64,
-                usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            });
-            if let (Some(scene), Some(bound)) = (&self.scene, &mut self.bound) {
-                bound.paths.rebind(&self.gpu.device, scene, [&self.params[0], &self.records, &self.pixel_list]);
-            }
-        }
-        self.gpu.queue.write_buffer(&self.pixel_list, 0, bytes);
     }
 
     pub(super) fn bind(&mut self) -> Result<(), RenderError> {

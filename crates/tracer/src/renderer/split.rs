@@ -47,7 +47,7 @@ impl Renderer {
     /// Mean luminance over the film with this many bounces and the environment's radiance times a factor.
     fn pilot(&self, pose: FilmPose, max_bounces: u32, environment: f32) -> Result<f64, RenderError> {
         let everywhere = Distribution::omnidirectional(self.distribution.inverse().clone());
-        let (layers, layer_count, _) = everywhere.encode();
+        let encoded = everywhere.encode(None);
         let next = self.batch_params(PILOT_SAMPLES)?;
         let params = BatchParams {
             first_index_low: 0,
@@ -61,8 +61,9 @@ impl Renderer {
             environment_radiance: next.environment_radiance.map(|c| c * environment),
             // What is lit does not depend on what stands behind it.
             has_backdrop: 0,
-            layers,
-            layer_count,
+            layers: encoded.layers,
+            layer_count: encoded.layer_count,
+            fovea_end: 0,
             ..next
         };
         self.gpu.queue.write_buffer(&self.params[0], 0, bytemuck::bytes_of(&params));

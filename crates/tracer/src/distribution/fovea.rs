@@ -1,0 +1,329 @@
+//! The film pixels about a gaze as a table with each pixel's share of the samples, from which the kernels choose by one number
+//! (`shaders/sampling/fovea.wesl`).
+//!
+//! A sample of an acuity layer that falls within [`RADIUS_DEG`] is chosen from the table instead. Pixels get what the layer's
+//! density gives them: its value at their centre times their solid angle times the part of them that lies within the radius. The
+//! rest of the layer is warped as ever, from the radius outwards.
+
+use std::f64::consts::{PI, TAU};
+
+use fovea_sampler::Inverse;
+use glam::{Mat3, Vec2, Vec3};
+
+use super::{FilmFrame, Gaze, View, gaze_frame, place_direction};
+use crate::film::{FilmMapping, FilmOptions};
+
+/// Eccentricity within which pixels have a table: where Reddy's acuity is flat.
+const RADIUS_DEG: f32 = 5.79;
+/// Larger tables cost more than a batch gains; near the poles of large films there is none.
+const MOST_PIXELS: u64 = 1 << 17;
+/// Rows of the film that are listed side by side, so that what is near in the table is near in the film.
+const BAND_ROWS: u32 = 8;
+/// Directions at which the rim is known.
+const RIM_POINTS: u32 = 64;
+/// Cells of equal share in which the density is taken as one.
+const DENSITY_CELLS: u32 = 64;
+
+/// A gaze's table, and what of which layers it stands for.
+#[derive(Debug)]
+pub(super) struct Fovea {
+    pub gaze: Gaze,
+    pub pixels: Table,
+    pub parts: Vec<Part>,
+    /// Where in the radial inverse's range the rim lies.
+    radius_end: f32,
+    /// In the world.
+    rim: Vec<Vec3>,
+}
+
+/// What of a layer is chosen from the table.
+#[derive(Debug)]
+pub(super) struct Part {
+    /// Its place in the mixture.
+    pub layer: usize,
+    /// Share of the layer's samples.
+    pub share: f64,
+    /// The part of the radial inverse's range that the layer keeps begins here.
+    pub radius_end: f32,
+}
+
+/// Pixels, and the sums of the weights up to each.
+#[derive(Debug, Default)]
+pub(super) struct Table {
+    pixels: Vec<u32>,
+    sums: Vec<f64>,
+}
+
+impl Table {
+    fn push(&mut self, pixel: u32, weight: f64) {
+        self.sums.push(self.sums.last().copied().unwrap_or(0.0) + weight);
+        self.pixels.push(pixel);
+    }
+
+    /// Lower ends of the pixels' intervals in `[from, from + size)`, fractions of 2^32 and multiples of 2^8, with the pixels.
+    pub fn intervals(&self, from: f64, size: f64) -> impl Iterator<Item = (u32, u32)> + '_ {
+        let scale = size / self.sums.last().copied().unwrap_or(1.0);
+        let lower = std::iter::once(0.0).chain(self.sums.iter().copied());
+        lower.zip(&self.pixels).map(move |(sum, &pixel)| (((from + sum * scale) * 2f64.powi(24)) as u32 * 256, pixel))
+    }
+}
+
+impl Fovea {
+    /// The table of a gaze on a film; `None` where the rim leaves the screen or the film, or has too many pixels within.
+    pub fn new(gaze: Gaze, inverse: &Inverse, film: FilmFrame<'_>) -> Option<Self> {
+        let radius = RADIUS_DEG.to_radians();
+        let versine = 2.0 * (0.5 * radius).sin().powi(2);
+        let radius_end = range_within(inverse, versine);
+        let rim: Option<Vec<Vec3>> = (0..RIM_POINTS)
+            .map(|k| direction(&gaze, versine, k as f32 / RIM_POINTS as f32).filter(|d| d.is_finite()))
+            .collect();
+        let rim = rim?;
+        let film_from_world = film.world_from_film.inverse();
+        let in_film: Vec<Vec3> = rim.iter().map(|&d| film_from_world * d).collect();
+        let centre = film_from_world * direction(&gaze, 0.0, 0.0)?;
+        let rows = rows_within(film.options, centre, &in_film)?;
+        let count: u64 = rows.iter().map(|row| u64::from(row.columns)).sum();
+        if count == 0 || count > MOST_PIXELS {
+            return None;
+        }
+        let nearest = in_film.iter().map(|d| d.angle_between(centre)).fold(f32::INFINITY, f32::min);
+        let pixel = Pixels {
+            gaze,
+            film,
+            radius: f64::from(radius),
+            // What a step of one pixel changes the eccentricity by, generously.
+            reach: 2.0 * pixel_angle(film.options) * f64::from(radius / nearest),
+            density: Density::within(inverse, radius_end),
+        };
+        let mut pixels = Table::default();
+        for band in rows.chunks(BAND_ROWS as usize) {
+            let first = band.iter().map(|row| row.first).min()?;
+            let last = band.iter().map(|row| row.first + i64::from(row.columns)).max()?;
+            for column in first..last {
+                for row in band.iter().filter(|row| (row.first..row.first + i64::from(row.columns)).contains(&column)) {
+                    let x = column.rem_euclid(i64::from(film.options.width)) as u32;
+                    let weight = pixel.weight(x, row.y);
+                    if weight > 0.0 {
+                        pixels.push(row.y * film.options.width + x, weight);
+                    }
+                }
+            }
+        }
+        (!pixels.pixels.is_empty()).then_some(Self { gaze, pixels, parts: Vec::new(), radius_end, rim })
+    }
+
+    /// Takes a layer's share within the radius over, unless the layer's view cuts through it.
+    pub fn take_from(&mut self, layer: usize, clip: Option<&View>, radius_scale: f32, inverse: &Inverse) {
+        let within = f64::from(self.radius_end / radius_scale);
+        let cuts = |view: &View| self.rim.iter().any(|&d| !is_inside(view, d));
+        if within > 0.9 || clip.is_some_and(cuts) {
+            return;
+        }
+        // Candidates outside a clipping view are drawn again, so what is within gets more.
+        let accepted = clip.map_or(1.0, |view| self.accepted(view, radius_scale, inverse));
+        let share = within / (within + (1.0 - within) * accepted);
+        self.parts.push(Part { layer, share, radius_end: self.radius_end });
+    }
+
+    /// Share of a layer's candidates from the rim outwards that lie in a view.
+    fn accepted(&self, view: &View, radius_scale: f32, inverse: &Inverse) -> f64 {
+        const RINGS: u32 = 32;
+        const AZIMUTHS: u32 = 64;
+        let inside = (0..RINGS * AZIMUTHS).filter(|k| {
+            let x = ((k / AZIMUTHS) as f32 + 0.5) / RINGS as f32;
+            let versine = inverse.eval_versine(self.radius_end + x * (radius_scale - self.radius_end));
+            direction(&self.gaze, versine, ((k % AZIMUTHS) as f32 + 0.5) / AZIMUTHS as f32)
+                .is_some_and(|d| is_inside(view, d))
+        });
+        inside.count() as f64 / f64::from(RINGS * AZIMUTHS)
+    }
+}
+
+fn is_inside(view: &View, direction: Vec3) -> bool {
+    view.project(direction).is_some_and(|p| p.abs().max_element() <= 1.0)
+}
+
+/// The direction in the world at a radius (1 - cos e) and azimuth (turns) about a gaze; `None` where it misses the screen.
+fn direction(gaze: &Gaze, versine: f32, turns: f32) -> Option<Vec3> {
+    let sine = (versine * (2.0 - versine)).max(0.0).sqrt();
+    let (sin, cos) = (std::f32::consts::TAU * turns).sin_cos();
+    let local = Vec3::new(sine * cos, sine * sin, 1.0 - versine);
+    match gaze {
+        Gaze::Scene { direction } => Some(gaze_frame(*direction) * local),
+        Gaze::Eye { on_screen, screen_half_extent, view } => {
+            let d = screen_from_gaze(*on_screen * *screen_half_extent) * local;
+            (d.z < -1e-3).then(|| view.direction(d.truncate() / (-d.z * *screen_half_extent)))
+        }
+    }
+}
+
+fn screen_from_gaze(on_screen: Vec2) -> Mat3 {
+    gaze_frame(on_screen.extend(-1.0).normalize())
+}
+
+/// How much of the radial inverse's range lies within a radius.
+fn range_within(inverse: &Inverse, versine: f32) -> f32 {
+    let (mut low, mut high) = (0.0f32, 1.0f32);
+    for _ in 0..30 {
+        let middle = 0.5 * (low + high);
+        if inverse.eval_versine(middle) < versine { low = middle } else { high = middle }
+    }
+    low
+}
+
+/// A layer's density over `1 - cos e`, up to a factor: constant in cells of equal share.
+#[derive(Debug)]
+struct Density {
+    /// Upper ends of the cells.
+    ends: Vec<f32>,
+    values: Vec<f64>,
+}
+
+impl Density {
+    fn within(inverse: &Inverse, radius_end: f32) -> Self {
+        let end = |k: u32| inverse.eval_versine(radius_end * k as f32 / DENSITY_CELLS as f32);
+        let value = |k: u32| 1.0 / f64::from((end(k) - end(k - 1)).max(f32::MIN_POSITIVE));
+        Self { ends: (1..=DENSITY_CELLS).map(end).collect(), values: (1..=DENSITY_CELLS).map(value).collect() }
+    }
+
+    fn at(&self, versine: f32) -> f64 {
+        let cell = self.ends.partition_point(|&end| end < versine);
+        self.values[cell.min(self.values.len() - 1)]
+    }
+}
+
+/// What weighs a pixel.
+struct Pixels<'a> {
+    gaze: Gaze,
+    film: FilmFrame<'a>,
+    /// Of the table, radians of eccentricity.
+    radius: f64,
+    /// Farther from the rim a pixel lies wholly on one side.
+    reach: f64,
+    density: Density,
+}
+
+impl Pixels<'_> {
+    fn weight(&self, x: u32, y: u32) -> f64 {
+        let Some((versine, eye_per_scene)) = self.seen(f64::from(x) + 0.5, f64::from(y) + 0.5) else { return 0.0 };
+        let inwards = self.radius - eccentricity(versine);
+        let covered =
+            if inwards.abs() > self.reach { f64::from(u8::from(inwards > 0.0)) } else { self.covered(x, y, inwards) };
+        covered * self.density.at(versine) * eye_per_scene * steradians(self.film.options, x, y)
+    }
+
+    /// Part of a pixel within the rim, of which the centre lies `inwards`. The rim is taken for straight there, at the mean distance of the
+    /// circle that it is.
+    fn covered(&self, x: u32, y: u32, inwards: f64) -> f64 {
+        let (x, y) = (f64::from(x), f64::from(y));
+        let ecc = |x, y| self.seen(x, y).map_or(PI, |(versine, _)| eccentricity(versine));
+        let a = (ecc(x + 1.0, y + 0.5) - ecc(x, y + 0.5)).abs();
+        let b = (ecc(x + 0.5, y + 1.0) - ecc(x + 0.5, y)).abs();
+        let inwards = inwards - (a * a + b * b) / (24.0 * self.radius);
+        // Of a unit square that a straight line cuts.
+        let least = 1e-3 * (a + b).max(1e-12);
+        let (a, b) = (a.max(least), b.max(least));
+        let square = |t: f64| t.max(0.0).powi(2);
+        let (sum, difference) = (0.5 * (a + b), 0.5 * (a - b));
+        let corners =
+            square(inwards + sum) - square(inwards + difference) - square(inwards - difference) + square(inwards - sum);
+        (corners / (2.0 * a * b)).clamp(0.0, 1.0)
+    }
+
+    /// 1 - cos of the eccentricity of a place on the film, and steradians at the eye for one in the scene there.
+    fn seen(&self, x: f64, y: f64) -> Option<(f32, f64)> {
+        let d = self.film.world_from_film * place_direction(self.film.options, x, y);
+        // Without the cancellation of 1 - cos.
+        let versine = |a: Vec3, b: Vec3| 0.5 * (a - b).length_squared();
+        match self.gaze {
+            Gaze::Scene { direction } => Some((versine(d, direction), 1.0)),
+            Gaze::Eye { on_screen, screen_half_extent, view } => {
+                let point = view.project(d)?;
+                let [in_view, at_eye] = [view.half_extent, screen_half_extent].map(|half| point * half);
+                let of_plane = |p: Vec2| f64::from(1.0 + p.length_squared()).powf(1.5);
+                let areas = screen_half_extent.element_product() / view.half_extent.element_product();
+                let gaze = (on_screen * screen_half_extent).extend(-1.0).normalize();
+                let eye = at_eye.extend(-1.0).normalize();
+                Some((versine(eye, gaze), f64::from(areas) * of_plane(in_view) / of_plane(at_eye)))
+            }
+        }
+    }
+}
+
+fn eccentricity(versine: f32) -> f64 {
+    2.0 * f64::from(0.5 * versine).sqrt().min(1.0).asin()
+}
+
+/// Solid angle of a pixel.
+fn steradians(film: &FilmOptions, x: u32, y: u32) -> f64 {
+    match film.mapping {
+        FilmMapping::Equirect => {
+            let edge = |row: u32| (PI * (0.5 - f64::from(row) / f64::from(film.height))).sin();
+            (edge(y) - edge(y + 1)) * TAU / f64::from(film.width)
+        }
+        FilmMapping::Perspective { half_extent } => {
+            let [u, v] =
+                [(x, film.width), (y, film.height)].map(|(k, size)| (2.0 * f64::from(k) + 1.0) / f64::from(size) - 1.0);
+            let [half_x, half_y] = half_extent.map(f64::from);
+            let area = 4.0 * half_x * half_y / film.pixels() as f64;
+            area / (1.0 + (u * half_x).powi(2) + (v * half_y).powi(2)).powf(1.5)
+        }
+    }
+}
+
+/// The largest angle across a pixel, radians.
+fn pixel_angle(film: &FilmOptions) -> f64 {
+    let side = match film.mapping {
+        FilmMapping::Equirect => (TAU / f64::from(film.width)).max(PI / f64::from(film.height)),
+        FilmMapping::Perspective { half_extent: [x, y] } => {
+            (2.0 * f64::from(x) / f64::from(film.width)).max(2.0 * f64::from(y) / f64::from(film.height))
+        }
+    };
+    side * std::f64::consts::SQRT_2
+}
+
+/// Pixels of a row that may lie within the rim; in a panorama columns go on beyond its edges.
+struct Row {
+    y: u32,
+    first: i64,
+    columns: u32,
+}
+
+/// Rows that the rim encloses; `None` where it leaves the film.
+fn rows_within(film: &FilmOptions, centre: Vec3, rim: &[Vec3]) -> Option<Vec<Row>> {
+    let (width, height) = (f64::from(film.width), f64::from(film.height));
+    match film.mapping {
+        FilmMapping::Equirect => {
+            let farthest = rim.iter().map(|d| d.angle_between(centre)).fold(0.0, f32::max);
+            let radius = f64::from(farthest) + pixel_angle(film);
+            let latitude = f64::from(centre.y.clamp(-1.0, 1.0)).asin();
+            let middle = (f64::from(centre.x).atan2(-f64::from(centre.z)) / TAU + 0.5) * width;
+            let row = |y: u32| {
+                let of_row = PI * (0.5 - (f64::from(y) + 0.5) / height);
+                let cosine = (radius.cos() - latitude.sin() * of_row.sin()) / (latitude.cos() * of_row.cos()).max(1e-9);
+                let half = (cosine.clamp(-1.0, 1.0).acos() / TAU * width).ceil() as i64 + 1;
+                let first = middle.floor() as i64 - half;
+                Row { y, first, columns: ((2 * half + 1) as u32).min(film.width) }
+            };
+            let y_of = |latitude: f64| ((0.5 - latitude / PI) * height).clamp(0.0, height);
+            let (top, bottom) = (y_of(latitude + radius).floor() as u32, y_of(latitude - radius).ceil() as u32);
+            Some((top..bottom).map(row).collect())
+        }
+        FilmMapping::Perspective { half_extent: [x, y] } => {
+            let place = |d: &Vec3| {
+                let p = (d.z < 0.0).then(|| d.truncate() / -d.z / Vec2::new(x, y))?;
+                let inside = p.abs().max_element() <= 1.0;
+                inside.then_some([0.5 * (1.0 + f64::from(p.x)) * width, 0.5 * (1.0 - f64::from(p.y)) * height])
+            };
+            let places: Vec<[f64; 2]> = rim.iter().map(place).collect::<Option<_>>()?;
+            let bound = |axis: usize, size: u32| {
+                let all = places.iter().map(|place| place[axis]);
+                let (low, high) = all.fold((f64::INFINITY, 0.0f64), |(low, high), p| (low.min(p), high.max(p)));
+                let low = (low - 1.0).max(0.0) as u32;
+                (low, ((high + 2.0) as u32).min(size))
+            };
+            let ((left, right), (top, bottom)) = (bound(0, film.width), bound(1, film.height));
+            Some((top..bottom).map(|y| Row { y, first: i64::from(left), columns: right - left }).collect())
+        }
+    }
+}

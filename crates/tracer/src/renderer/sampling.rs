@@ -1,0 +1,110 @@
+//! What chooses the pixels of samples, as it lies on the device: the mixture's lists, the table of the pixels about the gaze and the
+//! guide, in one buffer.
+
+use fovea_sampler::sequence::{Below, hash_combine};
+use glam::Quat;
+
+use super::Renderer;
+use crate::{
+    distribution::{Encoded, FilmFrame},
+    film::FilmOptions,
+    guide::Guide,
+    kernels::layout::{MAX_LAYERS, SampleLayer},
+};
+
+/// What is on the device, and where in the buffer its parts begin.
+#[derive(Debug)]
+pub(super) struct Sampling {
+    /// What it was made for; `None` when it is to be made anew.
+    key: Option<Key>,
+    pub layers: [SampleLayer; MAX_LAYERS],
+    pub layer_count: u32,
+    pub guide_first: u32,
+    pub fovea_first: u32,
+    pub fovea_count: u32,
+    pub fovea_end: u32,
+}
+
+/// What the table of the pixels about the gaze depends on, beside the distribution.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Key {
+    film: FilmOptions,
+    world_from_film: Quat,
+    /// Of the first random number.
+    scramble: u32,
+    has_fovea: bool,
+}
+
+impl Default for Sampling {
+    fn default() -> Self {
+        Self {
+            key: None,
+            layers: bytemuck::Zeroable::zeroed(),
+            layer_count: 0,
+            guide_first: 0,
+            fovea_first: 0,
+            fovea_count: 0,
+            fovea_end: 0,
+        }
+    }
+}
+
+impl Sampling {
+    /// Distribution or guide have changed.
+    pub fn forget(&mut self) {
+        self.key = None;
+    }
+}
+
+impl Renderer {
+    /// Brings to the device what the next batch's samples are chosen by, where it has changed.
+    ///
+    /// `is_guided`: points of the unit square are to be those of the layers alone.
+    pub(super) fn prepare_sampling(&mut self, is_guided: bool) {
+        let high = (self.next_sample >> 32) as u32;
+        let seed = if high == 0 { self.options.seed } else { hash_combine(self.options.seed, high) };
+        let key = Key {
+            film: self.options.film,
+            world_from_film: self.pose.world_from_film,
+            scramble: hash_combine(seed, 0),
+            // A guide moves samples between cells of the unit square, of which the table's are no places on the film.
+            has_fovea: !is_guided && !self.is_adaptive(),
+        };
+        if self.sampling.key == Some(key) {
+            return;
+        }
+        let frame = FilmFrame { options: &self.options.film, world_from_film: self.pose.world_from_film };
+        let Encoded { layers, layer_count, pixels: mut words, fovea, fovea_end } =
+            self.distribution.encode(key.has_fovea.then_some(frame));
+        let fovea_first = words.len() as u32;
+        let fovea_count = fovea.len() as u32;
+        words.extend(fovea.into_iter().flat_map(|(bound, pixel)| entry(bound.min(fovea_end), pixel, key.scramble)));
+        words.extend(entry(fovea_end, 0, key.scramble));
+        let guide_first = words.len() as u32;
+        words.extend(self.guide().into_iter().flat_map(Guide::table).map(|bound| bound.to_bits()));
+        self.upload_pixel_list(&words);
+        self.sampling =
+            Sampling { key: Some(key), layers, layer_count, guide_first, fovea_first, fovea_count, fovea_end };
+    }
+
+    fn upload_pixel_list(&mut self, words: &[u32]) {
+        let bytes: &[u8] = bytemuck::cast_slice(words);
+        if self.pixel_list.size() < bytes.len() as u64 {
+            self.pixel_list = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("pixel list"),
+                size: (bytes.len() as u64).next_power_of_two(),
+                usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            });
+            if let (Some(scene), Some(bound)) = (&self.scene, &mut self.bound) {
+                bound.paths.rebind(&self.gpu.device, scene, [&self.params[0], &self.records, &self.pixel_list]);
+            }
+        }
+        self.gpu.queue.write_buffer(&self.pixel_list, 0, bytes);
+    }
+}
+
+/// Words of an entry of the table, as `sampling::fovea` reads it.
+fn entry(bound: u32, pixel: u32, scramble: u32) -> [u32; 3] {
+    [bound, Below::new(bound, scramble).root, pixel]
+}
