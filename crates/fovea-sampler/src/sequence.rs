@@ -182,7 +182,7 @@ pub fn faure_quad(index: u32) -> [u32; 4] {
 pub fn vertex_numbers(index: u32, vertex: u32, seed: u32) -> [u32; 4] {
     let shuffle = hash_combine(seed, 0x5eed_0000 + vertex / 2);
     let point = faure_quad(owen_scramble(index, shuffle));
-    let [a, b] = if vertex % 2 == 0 { [point[0], point[1]] } else { [point[2], point[3]] };
+    let [a, b] = if vertex.is_multiple_of(2) { [point[0], point[1]] } else { [point[2], point[3]] };
     let scramble = hash_combine(shuffle, vertex % 2);
     [
         owen_scramble(a, hash(scramble ^ 0x68bc_21eb)),
