@@ -205,7 +205,7 @@ struct Row { words: vec4<u32>, pair: vec2<u32>, shuffled: vec2<u32>, vertex: vec
         let scrambled = owen_scramble(w.x, hash_combine(w.y, id.x));
         let numbers = vec4<u32>(scrambled, independent_u32(w.x, id.x, w.y), bitcast<u32>(to_unit(w.x)), strata_order(w.x & 1023u, 10u));
         let vertex = vertex_numbers(w.x, id.x, w.y);
-        let below = vec4<u32>(count_below(w.x, w.y & 0xffffff00u, id.x), 0u, 0u, 0u);
+        let below = vec4<u32>(count_below(w.x, hash_u32(w.y) & 0xffffff00u, w.y), 0u, 0u, 0u);
         rows[id.x] = Row(numbers, sobol_pair(w.x), shuffled_pair(w.x, id.x, w.y), vertex, below);
     }
 }
@@ -216,7 +216,7 @@ struct Row { words: vec4<u32>, pair: vec2<u32>, shuffled: vec2<u32>, vertex: vec
     for (i, ([x, seed], row)) in (0_u32..).zip(words.iter().zip(rows)) {
         let ([a, b], [c, d]) = (sequence::sobol_pair(*x), sequence::shuffled_pair(*x, i, *seed));
         let [e, f, g, h] = sequence::vertex_numbers(*x, i, *seed);
-        let below = sequence::Below { bound: seed & !0xff, root: i };
+        let below = sequence::Below::new(sequence::hash(*seed) & !0xff, *seed);
         let expected = [
             sequence::owen_scramble(*x, sequence::hash_combine(*seed, i)),
             sequence::independent(*x, i, *seed),

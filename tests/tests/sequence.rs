@@ -173,7 +173,10 @@ fn samples_of_a_pixel_near_the_gaze_are_numbered() {
         exchanged(
             sources,
             "sampling::random",
-            &[("(*state).index = number_in_pixel(entry, global.index);", "(*state).index += 0u;")],
+            &[(
+                "(*state).index = number_in_pixel(entry, global.index, hash_combine(global.seed, 0u));",
+                "(*state).index += 0u;",
+            )],
         )
     });
     assert!(share_numbered(&strata) < 0.05, "{}", share_numbered(&strata));

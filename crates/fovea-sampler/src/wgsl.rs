@@ -268,9 +268,23 @@ fn vertex_numbers(index: u32, vertex: u32, seed: u32) -> vec4<u32> {
     );
 }
 
-// How many of the first `index` points have a first number below `bound`, whose 8 low bits are 0; `root` is the index at which the
-// sequence takes the bound (fovea_sampler::sequence::Below).
-fn count_below(index: u32, bound: u32, root: u32) -> u32 {
+// What the scrambling's steps undo: x ^ (x * factor) = y for the low 24 bits of x; factors end in so many zeros that `turns` suffice.
+fn undo_step(y: u32, factor: u32, turns: u32) -> u32 {
+    var x = y;
+    for (var turn = 0u; turn < turns; turn = turn + 1u) {
+        x = y ^ (x * factor);
+    }
+    return x;
+}
+
+// How many of the first `index` points have a first number below `bound`, whose 8 low bits are 0, in the sequence that `seed`
+// scrambles (fovea_sampler::sequence::Below).
+fn count_below(index: u32, bound: u32, seed: u32) -> u32 {
+    // The index at which the sequence takes the bound, modulo 2^24.
+    var root = undo_step(reverseBits(bound), 0x8d22f6e6u, 24u);
+    root = undo_step(root, 0xc7afe638u, 8u);
+    root = undo_step(root, 0xb82f1e52u, 24u);
+    root = undo_step(root, 0x6c50b47cu, 12u) - seed;
     var count = 0u;
     for (var bit = 0u; bit < 24u; bit = bit + 1u) {
         let lower = 0xffffffffu >> (31u - bit);

@@ -393,16 +393,34 @@ pub fn film_direction(film: &FilmOptions, x: u32, y: u32) -> Vec3 {
 
 /// Direction, in the film's frame, of a place on it in pixels from its top left corner.
 fn place_direction(film: &FilmOptions, x: f64, y: f64) -> Vec3 {
-    let (u, v) = (x / f64::from(film.width), y / f64::from(film.height));
+    direction_of_parts(film, column_part(film, x), row_part(film, y))
+}
+
+/// What a column's directions have in common: sine and cosine of the longitude, or where it is on the image plane.
+fn column_part(film: &FilmOptions, x: f64) -> [f64; 2] {
+    let u = x / f64::from(film.width);
+    match film.mapping {
+        FilmMapping::Equirect => (std::f64::consts::TAU * (u - 0.5)).sin_cos().into(),
+        FilmMapping::Perspective { half_extent } => [(2.0 * u - 1.0) * f64::from(half_extent[0]), 0.0],
+    }
+}
+
+/// The same of a row: of the latitude.
+fn row_part(film: &FilmOptions, y: f64) -> [f64; 2] {
+    let v = y / f64::from(film.height);
+    match film.mapping {
+        FilmMapping::Equirect => (PI * (0.5 - v)).sin_cos().into(),
+        FilmMapping::Perspective { half_extent } => [(1.0 - 2.0 * v) * f64::from(half_extent[1]), 0.0],
+    }
+}
+
+/// Direction, in the film's frame, where a column crosses a row.
+fn direction_of_parts(film: &FilmOptions, column: [f64; 2], row: [f64; 2]) -> Vec3 {
     match film.mapping {
         FilmMapping::Equirect => {
-            let (sin_lon, cos_lon) = (std::f64::consts::TAU * (u - 0.5)).sin_cos();
-            let (sin_lat, cos_lat) = (PI * (0.5 - v)).sin_cos();
+            let ([sin_lon, cos_lon], [sin_lat, cos_lat]) = (column, row);
             glam::DVec3::new(cos_lat * sin_lon, sin_lat, -cos_lat * cos_lon).as_vec3()
         }
-        FilmMapping::Perspective { half_extent } => {
-            Vec3::new((2.0 * u - 1.0) as f32 * half_extent[0], (1.0 - 2.0 * v) as f32 * half_extent[1], -1.0)
-                .normalize()
-        }
+        FilmMapping::Perspective { .. } => Vec3::new(column[0] as f32, row[0] as f32, -1.0).normalize(),
     }
 }

@@ -9,8 +9,9 @@ use std::f64::consts::{PI, TAU};
 
 use fovea_sampler::Inverse;
 use glam::{Mat3, Vec2, Vec3};
+use rayon::prelude::*;
 
-use super::{FilmFrame, Gaze, View, gaze_frame, place_direction};
+use super::{FilmFrame, Gaze, View, column_part, direction_of_parts, gaze_frame, place_direction, row_part};
 use crate::film::{FilmMapping, FilmOptions};
 
 /// Eccentricity within which pixels have a table: where Reddy's acuity is flat.
@@ -87,27 +88,20 @@ impl Fovea {
             return None;
         }
         let nearest = in_film.iter().map(|d| d.angle_between(centre)).fold(f32::INFINITY, f32::min);
+        // What a step of one pixel changes the eccentricity by, generously.
+        let reach = 2.0 * pixel_angle(film.options) * f64::from(radius / nearest);
         let pixel = Pixels {
             gaze,
             film,
             radius: f64::from(radius),
-            // What a step of one pixel changes the eccentricity by, generously.
-            reach: 2.0 * pixel_angle(film.options) * f64::from(radius / nearest),
+            surely_inside: (1.0 - (f64::from(radius) - reach).max(0.0).cos()) as f32,
+            surely_outside: (1.0 - (f64::from(radius) + reach).cos()) as f32,
             density: Density::within(inverse, radius_end),
         };
+        let bands: Vec<Vec<(u32, f64)>> = rows.par_chunks(BAND_ROWS as usize).map(|band| pixel.of_band(band)).collect();
         let mut pixels = Table::default();
-        for band in rows.chunks(BAND_ROWS as usize) {
-            let first = band.iter().map(|row| row.first).min()?;
-            let last = band.iter().map(|row| row.first + i64::from(row.columns)).max()?;
-            for column in first..last {
-                for row in band.iter().filter(|row| (row.first..row.first + i64::from(row.columns)).contains(&column)) {
-                    let x = column.rem_euclid(i64::from(film.options.width)) as u32;
-                    let weight = pixel.weight(x, row.y);
-                    if weight > 0.0 {
-                        pixels.push(row.y * film.options.width + x, weight);
-                    }
-                }
-            }
+        for (number, weight) in bands.into_iter().flatten() {
+            pixels.push(number, weight);
         }
         (!pixels.pixels.is_empty()).then_some(Self { gaze, pixels, parts: Vec::new(), radius_end, rim })
     }
@@ -198,25 +192,52 @@ struct Pixels<'a> {
     film: FilmFrame<'a>,
     /// Of the table, radians of eccentricity.
     radius: f64,
-    /// Farther from the rim a pixel lies wholly on one side.
-    reach: f64,
+    /// 1 - cos of the eccentricity below which, and above which, a pixel's centre is far enough from the rim for all of it.
+    surely_inside: f32,
+    surely_outside: f32,
     density: Density,
 }
 
 impl Pixels<'_> {
-    fn weight(&self, x: u32, y: u32) -> f64 {
-        let Some((versine, eye_per_scene)) = self.seen(f64::from(x) + 0.5, f64::from(y) + 0.5) else { return 0.0 };
-        let inwards = self.radius - eccentricity(versine);
-        let covered =
-            if inwards.abs() > self.reach { f64::from(u8::from(inwards > 0.0)) } else { self.covered(x, y, inwards) };
-        covered * self.density.at(versine) * eye_per_scene * steradians(self.film.options, x, y)
+    /// Pixels of some rows, column by column, with their weights.
+    fn of_band(&self, band: &[Row]) -> Vec<(u32, f64)> {
+        let film = self.film.options;
+        let first = band.iter().map(|row| row.first).min().unwrap_or(0);
+        let last = band.iter().map(|row| row.first + i64::from(row.columns)).max().unwrap_or(0);
+        let row_parts: Vec<[f64; 2]> = band.iter().map(|row| row_part(film, f64::from(row.y) + 0.5)).collect();
+        let mut list = Vec::new();
+        for column in first..last {
+            let x = column.rem_euclid(i64::from(film.width)) as u32;
+            let column_part = column_part(film, f64::from(x) + 0.5);
+            for (row, row_part) in band.iter().zip(&row_parts) {
+                if (row.first..row.first + i64::from(row.columns)).contains(&column) {
+                    let centre = direction_of_parts(film, column_part, *row_part);
+                    let weight = self.weight(x, row.y, centre);
+                    if weight > 0.0 {
+                        list.push((row.y * film.width + x, weight));
+                    }
+                }
+            }
+        }
+        list
+    }
+
+    fn weight(&self, x: u32, y: u32, centre: Vec3) -> f64 {
+        let Some((versine, eye_per_scene)) = self.seen(centre) else { return 0.0 };
+        let covered = match versine {
+            v if v < self.surely_inside => 1.0,
+            v if v > self.surely_outside => return 0.0,
+            _ => self.covered(x, y, self.radius - eccentricity(versine)),
+        };
+        covered * self.density.at(versine) * eye_per_scene * steradians(self.film.options, centre)
     }
 
     /// Part of a pixel within the rim, of which the centre lies `inwards`. The rim is taken for straight there, at the mean distance of the
     /// circle that it is.
     fn covered(&self, x: u32, y: u32, inwards: f64) -> f64 {
         let (x, y) = (f64::from(x), f64::from(y));
-        let ecc = |x, y| self.seen(x, y).map_or(PI, |(versine, _)| eccentricity(versine));
+        let place = |x, y| self.seen(place_direction(self.film.options, x, y));
+        let ecc = |x, y| place(x, y).map_or(PI, |(versine, _)| eccentricity(versine));
         let a = (ecc(x + 1.0, y + 0.5) - ecc(x, y + 0.5)).abs();
         let b = (ecc(x + 0.5, y + 1.0) - ecc(x + 0.5, y)).abs();
         let inwards = inwards - (a * a + b * b) / (24.0 * self.radius);
@@ -230,9 +251,9 @@ impl Pixels<'_> {
         (corners / (2.0 * a * b)).clamp(0.0, 1.0)
     }
 
-    /// 1 - cos of the eccentricity of a place on the film, and steradians at the eye for one in the scene there.
-    fn seen(&self, x: f64, y: f64) -> Option<(f32, f64)> {
-        let d = self.film.world_from_film * place_direction(self.film.options, x, y);
+    /// 1 - cos of the eccentricity of a direction in the film's frame, and steradians at the eye for one in the scene there.
+    fn seen(&self, in_film: Vec3) -> Option<(f32, f64)> {
+        let d = self.film.world_from_film * in_film;
         // Without the cancellation of 1 - cos.
         let versine = |a: Vec3, b: Vec3| 0.5 * (a - b).length_squared();
         match self.gaze {
@@ -240,7 +261,7 @@ impl Pixels<'_> {
             Gaze::Eye { on_screen, screen_half_extent, view } => {
                 let point = view.project(d)?;
                 let [in_view, at_eye] = [view.half_extent, screen_half_extent].map(|half| point * half);
-                let of_plane = |p: Vec2| f64::from(1.0 + p.length_squared()).powf(1.5);
+                let of_plane = |p: Vec2| f64::from((1.0 + p.length_squared()) * (1.0 + p.length_squared()).sqrt());
                 let areas = screen_half_extent.element_product() / view.half_extent.element_product();
                 let gaze = (on_screen * screen_half_extent).extend(-1.0).normalize();
                 let eye = at_eye.extend(-1.0).normalize();
@@ -254,20 +275,11 @@ fn eccentricity(versine: f32) -> f64 {
     2.0 * f64::from(0.5 * versine).sqrt().min(1.0).asin()
 }
 
-/// Solid angle of a pixel.
-fn steradians(film: &FilmOptions, x: u32, y: u32) -> f64 {
+/// Solid angle of a pixel by the direction of its centre in the film's frame, up to a factor that is the film's.
+fn steradians(film: &FilmOptions, centre: Vec3) -> f64 {
     match film.mapping {
-        FilmMapping::Equirect => {
-            let edge = |row: u32| (PI * (0.5 - f64::from(row) / f64::from(film.height))).sin();
-            (edge(y) - edge(y + 1)) * TAU / f64::from(film.width)
-        }
-        FilmMapping::Perspective { half_extent } => {
-            let [u, v] =
-                [(x, film.width), (y, film.height)].map(|(k, size)| (2.0 * f64::from(k) + 1.0) / f64::from(size) - 1.0);
-            let [half_x, half_y] = half_extent.map(f64::from);
-            let area = 4.0 * half_x * half_y / film.pixels() as f64;
-            area / (1.0 + (u * half_x).powi(2) + (v * half_y).powi(2)).powf(1.5)
-        }
+        FilmMapping::Equirect => f64::from(centre.x.hypot(centre.z)),
+        FilmMapping::Perspective { .. } => f64::from(-centre.z).powi(3),
     }
 }
 

@@ -1,7 +1,6 @@
 //! What chooses the pixels of samples, as it lies on the device: the mixture's lists, the table of the pixels about the gaze and the
 //! guide, in one buffer.
 
-use fovea_sampler::sequence::{Below, hash_combine};
 use glam::Quat;
 
 use super::Renderer;
@@ -30,8 +29,6 @@ pub(super) struct Sampling {
 struct Key {
     film: FilmOptions,
     world_from_film: Quat,
-    /// Of the first random number.
-    scramble: u32,
     has_fovea: bool,
 }
 
@@ -61,12 +58,9 @@ impl Renderer {
     ///
     /// `is_guided`: points of the unit square are to be those of the layers alone.
     pub(super) fn prepare_sampling(&mut self, is_guided: bool) {
-        let high = (self.next_sample >> 32) as u32;
-        let seed = if high == 0 { self.options.seed } else { hash_combine(self.options.seed, high) };
         let key = Key {
             film: self.options.film,
             world_from_film: self.pose.world_from_film,
-            scramble: hash_combine(seed, 0),
             // A guide moves samples between cells of the unit square, of which the table's are no places on the film.
             has_fovea: !is_guided && !self.is_adaptive(),
         };
@@ -78,8 +72,8 @@ impl Renderer {
             self.distribution.encode(key.has_fovea.then_some(frame));
         let fovea_first = words.len() as u32;
         let fovea_count = fovea.len() as u32;
-        words.extend(fovea.into_iter().flat_map(|(bound, pixel)| entry(bound.min(fovea_end), pixel, key.scramble)));
-        words.extend(entry(fovea_end, 0, key.scramble));
+        words.extend(fovea.into_iter().flat_map(|(bound, pixel)| [bound.min(fovea_end), pixel]));
+        words.extend([fovea_end, 0]);
         let guide_first = words.len() as u32;
         words.extend(self.guide().into_iter().flat_map(Guide::table).map(|bound| bound.to_bits()));
         self.upload_pixel_list(&words);
@@ -102,9 +96,4 @@ impl Renderer {
         }
         self.gpu.queue.write_buffer(&self.pixel_list, 0, bytes);
     }
-}
-
-/// Words of an entry of the table, as `sampling::fovea` reads it.
-fn entry(bound: u32, pixel: u32, scramble: u32) -> [u32; 3] {
-    [bound, Below::new(bound, scramble).root, pixel]
 }
