@@ -1,8 +1,9 @@
-//! `sequence-report OUT_DIR SCENE...`: what low-discrepancy points gain over independent ones where the eye looks and over a panorama.
+//! `sequence-report OUT_DIR PART SCENE...`: what low-discrepancy points gain over independent ones where the eye looks and over a panorama.
 //!
-//! 8 bounces; see [`PARTS`] for films, samples and seeds. The variance of the pixels' luminance over the seeds, relative to its square,
-//! mean over the pixels (in FV those of the foveal disc, 5.79 degrees); and the ratio of the two sequences with its standard error
-//! (jackknife over the seeds). Neither depends on the machine's speed. Writes `sequence.json` (raw numbers) and `sequence.md`.
+//! 8 bounces; see [`PARTS`] for films, samples and seeds; `all` measures all of them. The variance of the pixels' luminance over the
+//! seeds, relative: in the foveal disc (5.79 degrees) to the mean square over its pixels, over the panorama each pixel's to its own
+//! square. And the ratio of the two sequences with its standard error (jackknife over the seeds). Neither depends on the machine's
+//! speed. Writes `sequence.json` (raw numbers; what was measured before of other scenes and parts stays) and `sequence.md`.
 
 use std::{path::Path, process::ExitCode, sync::Arc};
 
@@ -29,7 +30,7 @@ struct Part {
     seeds: u32,
 }
 
-const PARTS: [Part; 2] = [
+const PARTS: [Part; 3] = [
     Part {
         name: "fovea",
         title: "In the fovea: FV, the gaze at the film's centre",
@@ -37,6 +38,14 @@ const PARTS: [Part; 2] = [
         is_foveated: true,
         depths: &[16, 64, 256],
         seeds: 16,
+    },
+    Part {
+        name: "seeds",
+        title: "The same with more seeds",
+        film: FilmOptions::equirect(512, 256),
+        is_foveated: true,
+        depths: &[64],
+        seeds: 64,
     },
     Part {
         name: "panorama",
@@ -58,21 +67,28 @@ fn main() -> ExitCode {
 }
 
 fn run(args: &[String]) -> Result<(), AnyError> {
-    let [out, files @ ..] = args else { return Err("usage: sequence-report OUT_DIR SCENE...".into()) };
+    let [out, wanted, files @ ..] = args else { return Err("usage: sequence-report OUT_DIR PART|all SCENE...".into()) };
+    if wanted != "all" && PARTS.iter().all(|part| part.name != wanted) {
+        return Err(format!("no part {wanted}").into());
+    }
     let gpu = Gpu::headless(&AdapterSelect::Auto)?;
-    let mut scenes = Vec::new();
-    for file in files {
-        let subject = Subject::open(Some(Path::new(file)))?;
-        for part in &PARTS {
-            scenes.push(measure(&gpu, &subject, part)?);
+    let file = Path::new(out).join("sequence.json");
+    let before: Option<Value> = std::fs::read(&file).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
+    let mut found: Vec<Value> = before.and_then(|raw| raw["parts"].as_array().cloned()).unwrap_or_default();
+    for scene in files {
+        let subject = Subject::open(Some(Path::new(scene)))?;
+        for part in PARTS.iter().filter(|part| wanted == "all" || part.name == wanted) {
+            let measured = measure(&gpu, &subject, part)?;
+            found.retain(|old| old["scene"] != measured["scene"] || old["part"] != measured["part"]);
+            found.push(measured);
         }
     }
     let provenance = Provenance::on(&gpu);
     let machine: serde_json::Map<_, _> =
         provenance.fields().into_iter().map(|(name, value)| (name.into(), value.into())).collect();
-    let raw = json!({ "machine": machine, "parts": scenes });
+    let raw = json!({ "machine": machine, "parts": found });
     std::fs::create_dir_all(out)?;
-    std::fs::write(Path::new(out).join("sequence.json"), format!("{raw:#}\n"))?;
+    std::fs::write(file, format!("{raw:#}\n"))?;
     std::fs::write(Path::new(out).join("sequence.md"), table(&raw))?;
     Ok(())
 }
@@ -117,8 +133,9 @@ fn trace(
     Ok(found)
 }
 
-/// Variance over the seeds relative to the mean's square, mean over the pixels; seed `left_out` does not take part.
-fn relative_variance(discs: &[&Pixels], left_out: Option<usize>) -> f64 {
+/// Variance over the seeds relative to the mean's square, mean over the pixels, or of each pixel to its own; seed `left_out` does not
+/// take part.
+fn relative_variance(part: &Part, discs: &[&Pixels], left_out: Option<usize>) -> f64 {
     let used: Vec<&Pixels> = discs.iter().enumerate().filter(|(i, _)| Some(*i) != left_out).map(|(_, d)| *d).collect();
     let n = used.len() as f64;
     let pixels = used[0].len();
@@ -127,6 +144,10 @@ fn relative_variance(discs: &[&Pixels], left_out: Option<usize>) -> f64 {
         let variance = used.iter().map(|disc| (disc[p] - mean).powi(2)).sum::<f64>() / (n - 1.0);
         (variance, mean)
     };
+    if !part.is_foveated {
+        let own = (0..pixels).map(of_pixel).filter(|(_, mean)| *mean > 0.0);
+        return own.map(|(variance, mean)| variance / (mean * mean)).sum::<f64>() / pixels as f64;
+    }
     let (variance, square) = (0..pixels).map(of_pixel).fold((0.0, 0.0), |(v, s), (a, b)| (v + a, s + b * b));
     variance / square
 }
@@ -143,13 +164,13 @@ fn measure(gpu: &Gpu, subject: &Subject, part: &Part) -> Result<Value, AnyError>
     for (level, depth) in part.depths.iter().enumerate() {
         let discs: Vec<Vec<&Pixels>> =
             runs.iter().map(|seeds| seeds.iter().map(|run| &run[level].0).collect()).collect();
-        let variances = [relative_variance(&discs[0], None), relative_variance(&discs[1], None)];
+        let variances = [relative_variance(part, &discs[0], None), relative_variance(part, &discs[1], None)];
         let ratio = variances[1] / variances[0];
         // Seeds of the two sequences are independent: the relative errors add in squares.
         let relative_error = |discs: &[&Pixels], whole: f64| {
             let n = discs.len() as f64;
             let spread =
-                (0..discs.len()).map(|i| (relative_variance(discs, Some(i)) / whole - 1.0).powi(2)).sum::<f64>();
+                (0..discs.len()).map(|i| (relative_variance(part, discs, Some(i)) / whole - 1.0).powi(2)).sum::<f64>();
             ((n - 1.0) / n * spread).sqrt()
         };
         let error = ratio * relative_error(&discs[0], variances[0]).hypot(relative_error(&discs[1], variances[1]));
@@ -170,7 +191,7 @@ fn table(raw: &Value) -> String {
             text += &format!("- {name}: {}\n", value.as_str().unwrap_or_default());
         }
     }
-    text += "- 8 bounces; made by `cargo run -p fovea-benches --bin sequence-report -- docs/reports SCENE...`; raw numbers in \
+    text += "- 8 bounces; made by `cargo run -p fovea-benches --bin sequence-report -- docs/reports all SCENE...`; raw numbers in \
              sequence.json\n";
     for part in &PARTS {
         let [width, height] = [part.film.width, part.film.height];
