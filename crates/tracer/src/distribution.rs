@@ -296,6 +296,7 @@ impl Distribution {
             };
             foveas[fovea].take_from(at, clip.as_ref(), *radius_scale, &self.inverse);
         }
+        foveas.retain(|fovea| !fovea.parts.is_empty());
         foveas
     }
 }
@@ -422,5 +423,39 @@ fn direction_of_parts(film: &FilmOptions, column: [f64; 2], row: [f64; 2]) -> Ve
             glam::DVec3::new(cos_lat * sin_lon, sin_lat, -cos_lat * cos_lon).as_vec3()
         }
         FilmMapping::Perspective { .. } => Vec3::new(column[0] as f32, row[0] as f32, -1.0).normalize(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use fovea_sampler::{Angle, Geometry, RadialDistribution, Reddy2001};
+
+    use super::*;
+
+    fn encoded(view: View) -> Encoded {
+        let acuity = RadialDistribution::new(Reddy2001, Geometry::Sphere, Angle::from_degrees(80.0), 0.002);
+        let inverse = Arc::new(Inverse::default_for(&acuity.expect("valid constants")));
+        let clip = Clip { view, margin: 0.0, unclipped_share: 0.0 };
+        let foveated = Distribution::foveated(Gaze::Scene { direction: Vec3::NEG_Z }, Some(clip), inverse);
+        let film = FilmOptions::equirect(256, 128);
+        foveated.encode(Some(FilmFrame { options: &film, world_from_film: Quat::IDENTITY }))
+    }
+
+    /// Of the layer only corners beyond the table lie in a view that just holds the rim: most samples are the table's, not all.
+    #[test]
+    fn a_view_that_just_holds_the_table_leaves_the_layer_a_share() {
+        let encoded = encoded(View::new(Quat::IDENTITY, 11.7f32.to_radians(), 11.7f32.to_radians()));
+        let share = f64::from(encoded.fovea_end) / 2f64.powi(32);
+        assert!(share > 0.7 && share < 1.0 && encoded.layers[0].share > 0.0, "{share}");
+        assert!((encoded.layers[0].cumulative - 1.0).abs() < 1e-6);
+        assert!(encoded.fovea.is_sorted_by_key(|(bound, _)| *bound));
+    }
+
+    /// A view whose edge cuts through the disc has no table, nor the words of one.
+    #[test]
+    fn a_view_that_cuts_the_disc_has_no_table() {
+        let encoded = encoded(View::new(Quat::IDENTITY, 8f32.to_radians(), 8f32.to_radians()));
+        assert!(encoded.fovea.is_empty() && encoded.fovea_end == 0);
+        assert_eq!(encoded.layers[0].share, 1.0);
     }
 }

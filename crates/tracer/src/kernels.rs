@@ -21,7 +21,8 @@ pub mod pipelines;
 
 /// Threads of a workgroup in every one-dimensional kernel.
 pub const WORKGROUP_SIZE: u32 = 64;
-/// Runs into which the workgroups of one dispatch are dealt where an adapter's threads take runs: a multiple of what threads there are.
+/// Hands that the workgroups of one dispatch are dealt to where an adapter's threads take runs; evenest where it is a multiple of the
+/// threads.
 pub const GROUP_HANDS: u32 = 16;
 /// Threads of a workgroup along each axis of the view kernels.
 pub const TILE_SIZE: u32 = 8;

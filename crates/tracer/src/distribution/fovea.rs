@@ -119,7 +119,7 @@ impl Fovea {
         self.parts.push(Part { layer, share, radius_end: self.radius_end });
     }
 
-    /// Share of a layer's candidates from the rim outwards that lie in a view.
+    /// Share of a layer's candidates from the rim outwards that lie in a view; at least that of one of those that are tried.
     fn accepted(&self, view: &View, radius_scale: f32, inverse: &Inverse) -> f64 {
         const RINGS: u32 = 32;
         const AZIMUTHS: u32 = 64;
@@ -129,7 +129,7 @@ impl Fovea {
             direction(&self.gaze, versine, ((k % AZIMUTHS) as f32 + 0.5) / AZIMUTHS as f32)
                 .is_some_and(|d| is_inside(view, d))
         });
-        inside.count() as f64 / f64::from(RINGS * AZIMUTHS)
+        inside.count().max(1) as f64 / f64::from(RINGS * AZIMUTHS)
     }
 }
 
