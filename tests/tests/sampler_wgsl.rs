@@ -196,8 +196,9 @@ fn frames_equal_their_f32_twin() {
 fn sequences_equal_their_twins() {
     let gpu = software_or_default();
     let main = "
-@group(0) @binding(0) var<storage, read> words: array<vec2<u32>>;
-struct Row { words: vec4<u32>, pair: vec2<u32>, shuffled: vec2<u32>, vertex: vec4<u32>, below: vec4<u32> }
+struct Word { x: u32, y: u32, low: vec2<u32>, high: vec2<u32> }
+@group(0) @binding(0) var<storage, read> words: array<Word>;
+struct Row { words: vec4<u32>, pair: vec2<u32>, shuffled: vec2<u32>, vertex: vec4<u32>, between: vec4<u32> }
 @group(0) @binding(1) var<storage, read_write> rows: array<Row>;
 @compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x < arrayLength(&words) {
@@ -205,18 +206,28 @@ struct Row { words: vec4<u32>, pair: vec2<u32>, shuffled: vec2<u32>, vertex: vec
         let scrambled = owen_scramble(w.x, hash_combine(w.y, id.x));
         let numbers = vec4<u32>(scrambled, independent_u32(w.x, id.x, w.y), bitcast<u32>(to_unit(w.x)), strata_order(w.x & 1023u, 10u));
         let vertex = vertex_numbers(w.x, id.x, w.y);
-        let below = vec4<u32>(count_below(w.x, hash_u32(w.y) & 0xffffff00u, w.y), 0u, 0u, 0u);
-        rows[id.x] = Row(numbers, sobol_pair(w.x), shuffled_pair(w.x, id.x, w.y), vertex, below);
+        let between = vec4<u32>(count_between(w.x, w.low, w.high, w.y), 0u, 0u, 0u);
+        rows[id.x] = Row(numbers, sobol_pair(w.x), shuffled_pair(w.x, id.x, w.y), vertex, between);
     }
 }
 ";
-    let words: Vec<[u32; 2]> = (0..4096).map(|i| [sequence::hash(i), sequence::hash(!i)]).collect();
+    // Intervals of all widths from 2^-24 on.
+    let ends = |i: u32| {
+        let low = sequence::hash(i ^ 0x5a5a);
+        [low, low.saturating_add(u32::MAX >> (i % 24))].map(sequence::IntervalEnd::new)
+    };
+    let words: Vec<[u32; 6]> = (0..4096)
+        .map(|i| {
+            let [low, high] = ends(i);
+            [sequence::hash(i), sequence::hash(!i), low.value, low.root, high.value, high.root]
+        })
+        .collect();
     let text = wgsl::sequence_module() + main;
     let rows: Vec<[u32; 16]> = run(&gpu, &text, bytemuck::cast_slice(&words), words.len());
-    for (i, ([x, seed], row)) in (0_u32..).zip(words.iter().zip(rows)) {
+    for (i, ([x, seed, ..], row)) in (0_u32..).zip(words.iter().zip(rows)) {
         let ([a, b], [c, d]) = (sequence::sobol_pair(*x), sequence::shuffled_pair(*x, i, *seed));
         let [e, f, g, h] = sequence::vertex_numbers(*x, i, *seed);
-        let below = sequence::Below::new(sequence::hash(*seed) & !0xff, *seed);
+        let [low, high] = ends(i);
         let expected = [
             sequence::owen_scramble(*x, sequence::hash_combine(*seed, i)),
             sequence::independent(*x, i, *seed),
@@ -230,7 +241,7 @@ struct Row { words: vec4<u32>, pair: vec2<u32>, shuffled: vec2<u32>, vertex: vec
             f,
             g,
             h,
-            below.count(*x),
+            sequence::count_between(*x, low, high, *seed),
             0,
             0,
             0,

@@ -19,6 +19,8 @@ pub const DIMENSIONS: usize = 32;
 
 /// Bits of an index and of a value.
 const BITS: usize = 32;
+/// Bits of a number that make an f32 in [0, 1).
+const FRACTION_BITS: u32 = 24;
 
 /// Degree, inner coefficients and initial numbers of dimensions 1.. (dimension 0 is van der Corput's), from Joe and Kuo 2008.
 /// Bit `degree - 1 - k` of the coefficients belongs to `x^k` for `0 < k < degree`; the outer coefficients are 1.
@@ -214,60 +216,78 @@ pub fn owen_scramble(value: u32, seed: u32) -> u32 {
 /// The inverse of [`owen_scramble`]: the value whose scramble by `seed` this is.
 #[must_use]
 pub fn owen_unscramble(value: u32, seed: u32) -> u32 {
-    // `factor` is even: each turn makes one more low bit right at least, and as many as the factor has zeros at its end.
-    let undo = |y: u32, factor: u32| {
-        let turns = 32 / factor.trailing_zeros();
-        (0..turns).fold(y, |x, _| y ^ x.wrapping_mul(factor))
-    };
-    let mut x = value.reverse_bits();
-    for factor in [0x8d22_f6e6, 0xc7af_e638, 0xb82f_1e52, 0x6c50_b47c] {
-        x = undo(x, factor);
-    }
+    let [x] = unscramble_but_for_the_seed([value], u32::BITS);
     x.wrapping_sub(seed).reverse_bits()
 }
 
-/// How many of the first points of a scrambled sequence have a first number below a bound: which number a point has among those in
-/// an interval, without having seen the others.
-///
-/// # Definition
-/// The `i`-th first number is `owen_scramble(sobol(i, 0), seed)`. [`Below::count`] is the number of `i < index` with a first number
-/// below [`Below::bound`].
-///
-/// # Formula
-/// Numbers below the bound share its first `k` bits for some `k` and have a 0 where it has a 1. In van der Corput's sequence, scrambled
-/// or not, they are those whose indices have one residue modulo `2^(k + 1)`; the residues are read off the index at which the
-/// sequence takes the bound itself, [`Below::root`].
-///
-/// # Numerics
-/// Integers: exact.
+/// What [`owen_scramble`] has added the seed to make of the reversed bits: right in its lowest `bits`. Each turn waits for the last, so
+/// several values at once take little longer than one.
+fn unscramble_but_for_the_seed<const N: usize>(values: [u32; N], bits: u32) -> [u32; N] {
+    [0x8d22_f6e6u32, 0xc7af_e638, 0xb82f_1e52, 0x6c50_b47c].into_iter().fold(
+        values.map(u32::reverse_bits),
+        |y, factor| {
+            // `factor` is even: each turn makes one more low bit right at least, and as many as the factor has zeros at its end.
+            (0..bits / factor.trailing_zeros())
+                .fold(y, |x, _| std::array::from_fn(|i| y[i] ^ x[i].wrapping_mul(factor)))
+        },
+    )
+}
+
+/// An end of an interval of first numbers, made ready for [`count_between`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Below {
-    /// A fraction of 2^32.
-    pub bound: u32,
-    /// The index whose first number is the bound.
+pub struct IntervalEnd {
+    /// A fraction of 2^32, a multiple of 2^8.
+    pub value: u32,
+    /// Once a sequence's seed is subtracted, the index at which it takes the value, modulo 2^24.
     pub root: u32,
 }
 
-impl Below {
-    /// The bound in the sequence that `seed` scrambles.
+impl IntervalEnd {
+    /// The end at `value`, whose low 8 bits are dropped.
     #[must_use]
-    pub fn new(bound: u32, seed: u32) -> Self {
-        Self { bound, root: owen_unscramble(bound, seed).reverse_bits() }
+    pub fn new(value: u32) -> Self {
+        let [end] = Self::several([value]);
+        end
     }
 
-    /// How many of the first `index` first numbers are below the bound.
+    /// Several ends, which take little longer than one.
     #[must_use]
-    pub fn count(self, index: u32) -> u32 {
-        (0..BITS as u32)
-            .filter(|bit| self.bound >> (31 - bit) & 1 == 1)
-            .map(|bit| {
-                let lower = u32::MAX >> (31 - bit);
-                let residue = (self.root ^ (1 << bit)) & lower;
-                // Whole periods of 2^(bit + 1) indices hold one each.
-                (u64::from(index) >> (bit + 1)) as u32 + u32::from(index & lower > residue)
-            })
-            .sum()
+    pub fn several<const N: usize>(values: [u32; N]) -> [Self; N] {
+        let values = values.map(|value| value & !0xff);
+        let roots = unscramble_but_for_the_seed(values, FRACTION_BITS);
+        std::array::from_fn(|i| Self { value: values[i], root: roots[i] & 0x00ff_ffff })
     }
+
+    /// Of the first `index` numbers those that share its first `bit` bits and have a 0 where it has a 1 next.
+    fn count_at(self, bit: u32, index: u32, seed: u32) -> u32 {
+        let lower = u32::MAX >> (31 - bit);
+        let residue = (self.root.wrapping_sub(seed) ^ (1 << bit)) & lower;
+        // Whole periods of 2^(bit + 1) indices hold one each.
+        let count = (u64::from(index) >> (bit + 1)) as u32 + u32::from(index & lower > residue);
+        if self.value >> (31 - bit) & 1 == 1 { count } else { 0 }
+    }
+}
+
+/// How many of the first points of a scrambled sequence have a first number in an interval: which number a point has among those there,
+/// without having seen the others.
+///
+/// # Definition
+/// The `i`-th first number is `owen_scramble(sobol(i, 0), seed)`. This is the number of `i < index` with a first number from `low` on
+/// and below `high`.
+///
+/// # Formula
+/// The numbers below a bound share its first `k` bits for some `k` and have a 0 where it has a 1. In van der Corput's sequence, scrambled
+/// or not, they are those whose indices have one residue modulo `2^(k + 1)`; the residues are read off the index at which the
+/// sequence takes the bound itself. Bits that both ends begin with count for neither.
+///
+/// # Numerics
+/// Integers: exact.
+#[must_use]
+pub fn count_between(index: u32, low: IntervalEnd, high: IntervalEnd, seed: u32) -> u32 {
+    let first_bit = (low.value ^ high.value).leading_zeros();
+    (first_bit..FRACTION_BITS).fold(0u32, |count, bit| {
+        count.wrapping_add(high.count_at(bit, index, seed)).wrapping_sub(low.count_at(bit, index, seed))
+    })
 }
 
 /// A hash of two words.

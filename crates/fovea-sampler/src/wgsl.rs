@@ -139,8 +139,8 @@ fn warp_local() -> String {
              let r2 = r * r;\n    \
              let s = r * {};\n    \
              let c = {};\n    \
-             let turned = select(vec2<f32>(c, s), vec2<f32>(-s, c), (i32(quarter) & 1) == 1);\n    \
-             return select(turned, -turned, (i32(quarter) & 2) == 2);\n}}\n\n\
+             let turned = select(vec2<f32>(c, s), vec2<f32>(-s, c), quarter == 1.0f || quarter == 3.0f);\n    \
+             return select(turned, -turned, quarter == 2.0f || quarter == 3.0f);\n}}\n\n\
          // The direction in the gaze's frame.\n\
          fn warp_local(u: vec2<f32>) -> vec3<f32> {{\n    \
              let v = warp_radius(u.x);\n    \
@@ -168,7 +168,7 @@ fn gaze_frame(n: vec3<f32>) -> mat3x3<f32> {
 ";
 
 /// WGSL of [`crate::sequence`]: `hash_u32`, `hash_combine`, `owen_scramble`, `sobol_pair`, `shuffled_pair`, `vertex_numbers`,
-/// `count_below`, `independent_u32`, `to_unit`, `strata_order`.
+/// `count_between`, `independent_u32`, `to_unit`, `strata_order`.
 #[must_use]
 pub fn sequence_module() -> String {
     String::from(
@@ -268,31 +268,21 @@ fn vertex_numbers(index: u32, vertex: u32, seed: u32) -> vec4<u32> {
     );
 }
 
-// What the scrambling's steps undo: x ^ (x * factor) = y for the low 24 bits of x; factors end in so many zeros that `turns` suffice.
-fn undo_step(y: u32, factor: u32, turns: u32) -> u32 {
-    var x = y;
-    for (var turn = 0u; turn < turns; turn = turn + 1u) {
-        x = y ^ (x * factor);
-    }
-    return x;
-}
-
-// How many of the first `index` points have a first number below `bound`, whose 8 low bits are 0, in the sequence that `seed`
-// scrambles (fovea_sampler::sequence::Below).
-fn count_below(index: u32, bound: u32, seed: u32) -> u32 {
-    // The index at which the sequence takes the bound, modulo 2^24.
-    var root = undo_step(reverseBits(bound), 0x8d22f6e6u, 24u);
-    root = undo_step(root, 0xc7afe638u, 8u);
-    root = undo_step(root, 0xb82f1e52u, 24u);
-    root = undo_step(root, 0x6c50b47cu, 12u) - seed;
-    var count = 0u;
-    for (var bit = 0u; bit < 24u; bit = bit + 1u) {
+// How many of the first `index` points have a first number in [low.x, high.x), whose 8 low bits are 0, in the sequence that `seed`
+// scrambles; y: roots (fovea_sampler::sequence::IntervalEnd).
+fn count_between(index: u32, low: vec2<u32>, high: vec2<u32>, seed: u32) -> u32 {
+    let values = vec2<u32>(low.x, high.x);
+    let roots = vec2<u32>(low.y, high.y) - seed;
+    var counts = vec2<u32>(0u);
+    // Bits that both ends begin with count for neither.
+    for (var bit = countLeadingZeros(low.x ^ high.x); bit < 24u; bit = bit + 1u) {
         let lower = 0xffffffffu >> (31u - bit);
-        let residue = (root ^ (1u << bit)) & lower;
-        let below = ((index >> bit) >> 1u) + select(0u, 1u, (index & lower) > residue);
-        count = count + select(0u, below, ((bound >> (31u - bit)) & 1u) == 1u);
+        let residues = (roots ^ vec2<u32>(1u << bit)) & vec2<u32>(lower);
+        let here = vec2<u32>((index >> bit) >> 1u) + select(vec2<u32>(0u), vec2<u32>(1u), vec2<u32>(index & lower) > residues);
+        let digits = (values >> vec2<u32>(31u - bit)) & vec2<u32>(1u);
+        counts = counts + select(vec2<u32>(0u), here, digits == vec2<u32>(1u));
     }
-    return count;
+    return counts.y - counts.x;
 }
 
 // Independent numbers: a hash of all three.

@@ -12,6 +12,7 @@ use rayon::prelude::*;
 mod fovea;
 
 use fovea::Fovea;
+pub(crate) use fovea::TableWords;
 
 use crate::{
     film::{FilmMapping, FilmOptions},

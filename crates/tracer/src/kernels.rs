@@ -60,6 +60,7 @@ const MODULES: &[(&str, &str)] = &[
     ("scene::texture", include_str!("../../../shaders/scene/texture.wesl")),
     ("scene::alpha", include_str!("../../../shaders/scene/alpha.wesl")),
     ("scene::query", include_str!("../../../shaders/scene/query.wesl")),
+    ("scene::identify", include_str!("../../../shaders/scene/identify.wesl")),
     ("scene::surface", include_str!("../../../shaders/scene/surface.wesl")),
     ("shading::fresnel", include_str!("../../../shaders/shading/fresnel.wesl")),
     ("shading::layers", include_str!("../../../shaders/shading/layers.wesl")),
@@ -134,6 +135,8 @@ pub enum Kernel {
     Noise,
     /// What a list of rays meets.
     Query,
+    /// Which part of the scene the answers to a list of rays are.
+    Identify,
     /// Records to film.
     Accumulate,
     /// Film to view.
@@ -178,7 +181,7 @@ pub enum Kernel {
 
 impl Kernel {
     /// Every kernel.
-    pub const ALL: [Self; 27] = [
+    pub const ALL: [Self; 28] = [
         Self::Trace,
         Self::Start,
         Self::Extend,
@@ -186,6 +189,7 @@ impl Kernel {
         Self::Generate,
         Self::Noise,
         Self::Query,
+        Self::Identify,
         Self::Accumulate,
         Self::Gather,
         Self::Pull,
@@ -218,6 +222,7 @@ impl Kernel {
             Self::Generate => "path::generate",
             Self::Noise => "sampling::noise",
             Self::Query => "scene::query",
+            Self::Identify => "scene::identify",
             Self::Accumulate => "film::accumulate",
             Self::Gather => "view::gather",
             Self::Pull => "view::pull",
@@ -258,7 +263,10 @@ impl Kernel {
     /// Whether the scene's features are flags of this kernel.
     pub const fn reads_scene(self) -> bool {
         self.traces_paths()
-            || matches!(self, Self::Start | Self::Generate | Self::Query | Self::FirstHit | Self::Sketch)
+            || matches!(
+                self,
+                Self::Start | Self::Generate | Self::Query | Self::Identify | Self::FirstHit | Self::Sketch
+            )
     }
 
     /// Whether this extends or shades paths, by what the scene and the technique need.
@@ -281,6 +289,7 @@ impl Kernel {
             Self::Generate => "generate",
             Self::Noise => "noise",
             Self::Query => "query",
+            Self::Identify => "identify",
             Self::Accumulate => "accumulate",
             Self::Gather => "gather",
             Self::Pull => "pull",

@@ -502,7 +502,7 @@ impl Renderer {
         let perspective = matches!(self.options.film.mapping, FilmMapping::Perspective { .. });
         let scene = self.scene.as_ref();
         let own = scene.map(|s| s.features).unwrap_or_default();
-        let features = if matches!(kernel, Kernel::Query | Kernel::FirstHit) {
+        let features = if matches!(kernel, Kernel::Query | Kernel::Identify | Kernel::FirstHit) {
             own
         } else if kernel.traces_paths() {
             own.union(self.spare_features)

@@ -1,8 +1,8 @@
 //! The sequences: their structure, their scrambling, and what they gain over independent points.
 
 use fovea_sampler::sequence::{
-    Below, DIMENSIONS, direction_numbers, faure_quad, hash_combine, independent, owen_scramble, owen_unscramble,
-    shuffled_pair, sobol, sobol_owen, sobol_pair, strata_order, to_unit_f32, vertex_numbers,
+    DIMENSIONS, IntervalEnd, count_between, direction_numbers, faure_quad, hash_combine, independent, owen_scramble,
+    owen_unscramble, shuffled_pair, sobol, sobol_owen, sobol_pair, strata_order, to_unit_f32, vertex_numbers,
 };
 use fovea_sampler::{Angle, Film, GazeWarp, Geometry, RadialDistribution, Reddy2001};
 
@@ -180,21 +180,26 @@ fn unscrambling_undoes_scrambling() {
 
 /// Against counting; and for large indices, whole periods and the last index there is.
 #[test]
-fn points_below_a_bound_are_counted_without_seeing_them() {
-    let bounds = [0, 1, 0x100, 0x18b2_a400, 0x7fff_ffff, 0x8000_0000, 0xdead_beef, u32::MAX];
-    for (bound, seed) in bounds.into_iter().flat_map(|bound| [0, 7, 0xdead_beef].map(|seed| (bound, seed))) {
-        let below = Below::new(bound, seed);
-        assert_eq!(sobol_owen_first(below.root, seed), bound);
+fn points_in_an_interval_are_counted_without_seeing_them() {
+    let values = [0, 0x100, 0x18b2_a400, 0x18b2_a500, 0x7fff_ff00, 0x8000_0000, 0xdead_be00, 0xffff_ff00];
+    let pairs = values
+        .into_iter()
+        .flat_map(|low| values.into_iter().filter_map(move |high| (low <= high).then_some((low, high))));
+    for ((low, high), seed) in pairs.flat_map(|pair| [0, 7, 0xdead_beef].map(|seed| (pair, seed))) {
+        let ends = [low, high].map(IntervalEnd::new);
+        assert_eq!(ends.map(|end| end.value), [low, high]);
         let mut counted = 0;
         for index in 0..3000 {
-            assert_eq!(below.count(index), counted, "{bound:x}, seed {seed:x}, index {index}");
-            counted += u32::from(sobol_owen_first(index, seed) < bound);
+            let found = count_between(index, ends[0], ends[1], seed);
+            assert_eq!(found, counted, "{low:x} to {high:x}, seed {seed:x}, index {index}");
+            counted += u32::from((low..high).contains(&sobol_owen_first(index, seed)));
         }
         // Each whole period of 2^k points has one in each interval of 2^-k.
-        let cell = Below::new(bound & 0xfff0_0000, seed);
-        assert_eq!(cell.count(5 << 12), 5 * (cell.bound >> 20));
-        assert!(u64::from(Below::new(bound, seed).count(u32::MAX)).abs_diff(u64::from(bound)) <= 1);
+        let cells = [low, high].map(|end| IntervalEnd::new(end & 0xfff0_0000));
+        assert_eq!(count_between(5 << 12, cells[0], cells[1], seed), 5 * ((cells[1].value - cells[0].value) >> 20));
+        assert!(count_between(u32::MAX, ends[0], ends[1], seed).abs_diff(high - low) <= 1);
     }
+    assert_eq!(IntervalEnd::new(0x1ff), IntervalEnd::new(0x100));
 }
 
 fn sobol_owen_first(index: u32, seed: u32) -> u32 {

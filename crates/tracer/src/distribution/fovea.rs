@@ -7,7 +7,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use fovea_sampler::Inverse;
+use fovea_sampler::{Inverse, sequence::IntervalEnd};
 use glam::{Mat3, Vec2, Vec3};
 use rayon::prelude::*;
 
@@ -66,6 +66,46 @@ impl Table {
         let scale = size / self.sums.last().copied().unwrap_or(1.0);
         let lower = std::iter::once(0.0).chain(self.sums.iter().copied());
         lower.zip(&self.pixels).map(move |(sum, &pixel)| (((from + sum * scale) * 2f64.powi(24)) as u32 * 256, pixel))
+    }
+}
+
+/// A table as the kernels read it.
+#[derive(Debug, Default)]
+pub(crate) struct TableWords {
+    /// Of each pixel the lower end of its interval, the end's root and the pixel; and one entry that ends the last interval.
+    pub entries: Vec<[u32; 3]>,
+    /// For cells of equal width from 0 on, and for the end of the last: the pixel in whose interval it begins. About as many as pixels, so
+    /// that a search takes a step or two however many there are.
+    pub cells: Vec<u32>,
+    /// A cell is 2^this of 2^32 wide.
+    pub cell_bits: u32,
+}
+
+impl TableWords {
+    /// Of intervals by their lower ends, ascending, with pixels; the last one's upper end. Empty where there are none.
+    pub fn new(intervals: &[(u32, u32)], end: u32) -> Self {
+        let (count, Some(last)) = (intervals.len(), end.checked_sub(1)) else { return Self::default() };
+        let mut entries: Vec<[u32; 3]> = vec![[0; 3]; count + 1];
+        entries.par_chunks_mut(8).with_min_len(1 << 7).zip(intervals.par_chunks(8)).for_each(|(entries, intervals)| {
+            let interval = |i: usize| intervals.get(i).copied().unwrap_or_default();
+            let ends = IntervalEnd::several(std::array::from_fn::<_, 8, _>(|i| interval(i).0.min(end)));
+            for (i, (entry, end)) in entries.iter_mut().zip(ends).enumerate() {
+                *entry = [end.value, end.root, interval(i).1];
+            }
+        });
+        let end = IntervalEnd::new(end);
+        entries[count] = [end.value, end.root, 0];
+        let cell_bits = (0..31).find(|&bits| ((last >> bits) as usize) < count).unwrap_or(31);
+        let mut at = 0;
+        let cells = (0..=u64::from(last >> cell_bits) + 1)
+            .map(|cell| {
+                while at + 1 < count && u64::from(entries[at + 1][0]) <= cell << cell_bits {
+                    at += 1;
+                }
+                at as u32
+            })
+            .collect();
+        Self { entries, cells, cell_bits }
     }
 }
 
@@ -337,5 +377,33 @@ fn rows_within(film: &FilmOptions, centre: Vec3, rim: &[Vec3]) -> Option<Vec<Row
             let ((left, right), (top, bottom)) = (bound(0, film.width), bound(1, film.height));
             Some((top..bottom).map(|y| Row { y, first: i64::from(left), columns: right - left }).collect())
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::TableWords;
+
+    /// What the kernels' search finds, for the first and the last number of every interval: empty ones, one that many cells fall into,
+    /// and many in one cell.
+    #[test]
+    fn cells_lead_to_the_interval_of_a_number() {
+        let ends: Vec<u32> =
+            [0, 0x100, 0x100, 0x200, 0x8000_0000].into_iter().chain((0..900).map(|i| 0x9000_0000 + 256 * i)).collect();
+        let intervals: Vec<(u32, u32)> = ends.iter().zip(0..).map(|(&end, pixel)| (end, pixel)).collect();
+        for end in [0xa000_0000, 0xffff_ff00] {
+            let table = TableWords::new(&intervals, end);
+            assert_eq!(table.entries.len(), ends.len() + 1);
+            assert!(table.cells.len() <= ends.len() + 1);
+            let numbers = ends.iter().flat_map(|&x| [x, x.saturating_sub(1)]).chain([end - 1]);
+            for x in numbers {
+                let cell = (x >> table.cell_bits) as usize;
+                let expected = ends.partition_point(|&lower| lower <= x) - 1;
+                let found = table.cells[cell] as usize..=table.cells[cell + 1] as usize;
+                assert!(found.contains(&expected), "{x:x}: {expected} in {found:?}");
+            }
+        }
+        assert!(TableWords::new(&[], 0).entries.is_empty());
+        assert_eq!(TableWords::new(&[(0, 7)], 0x100).cells, [0, 0]);
     }
 }

@@ -102,8 +102,8 @@ shared! {
         guide_rows: u32,
         fovea_end: u32,
         fovea_first: u32,
-        fovea_count: u32,
-        pad_0: u32,
+        fovea_cells: u32,
+        fovea_cell_bits: u32,
         order: [[u32; 4]; 5],
         layers: [SampleLayer; MAX_LAYERS],
     }

@@ -92,8 +92,8 @@ impl Renderer {
             guide_rows: 0,
             fovea_end: sampling.fovea_end,
             fovea_first: sampling.fovea_first,
-            fovea_count: sampling.fovea_count,
-            pad_0: 0,
+            fovea_cells: sampling.fovea_cells,
+            fovea_cell_bits: sampling.fovea_cell_bits,
             order,
             layers: sampling.layers,
         })

@@ -12,6 +12,7 @@ use crate::{
     kernels::{
         Kernel,
         layout::{QueryHit, QueryRay, codes},
+        pipelines::Pipeline,
     },
 };
 
@@ -64,7 +65,7 @@ pub struct QueryAnswer {
 const LARGEST_QUERY: usize = 1 << 20;
 
 impl Renderer {
-    /// What each ray meets, transparent parts of alpha-tested surfaces left out; and the seconds that the device took, where it
+    /// What each ray meets, transparent parts of alpha-tested surfaces left out; and the seconds that the device took to traverse, where it
     /// has timestamps. Waits for the device. The film is not touched.
     ///
     /// # Errors
@@ -86,8 +87,9 @@ impl Renderer {
 
     fn query_chunk(&mut self, rays: &[Query]) -> Result<(Vec<QueryHit>, Option<f64>), RenderError> {
         let gpu = self.gpu.clone();
-        let key = self.key(Kernel::Query);
-        let kernel = self.pipelines.compute(&gpu.device, &key)?;
+        let keys = [Kernel::Query, Kernel::Identify].map(|kernel| self.key(kernel));
+        let query = self.pipelines.compute(&gpu.device, &keys[0])?;
+        let identify = self.pipelines.compute(&gpu.device, &keys[1])?;
         let scene = self.scene.as_ref().ok_or(RenderError::NoScene)?;
         let encoded: Vec<QueryRay> = rays
             .iter()
@@ -110,10 +112,15 @@ impl Renderer {
             mapped_at_creation: false,
         });
         let buffers = [(0, ray_buffer.as_entire_binding()), (1, hit_buffer.as_entire_binding())];
-        let groups = [kernel.bind(&gpu.device, 0, &buffers), scene_group(&gpu.device, &kernel, scene)];
-        let seconds = self.timed_pass(kernel.label(), |pass| {
-            kernel.dispatch(pass, &[&groups[0], &groups[1]], workgroups(rays.len() as u32));
-        })?;
+        let bound =
+            |kernel: &Pipeline| [kernel.bind(&gpu.device, 0, &buffers), scene_group(&gpu.device, kernel, scene)];
+        let run = |kernel: &Pipeline, groups: &[Option<wgpu::BindGroup>; 2]| {
+            self.timed_pass(kernel.label(), |pass| {
+                kernel.dispatch(pass, &[&groups[0], &groups[1]], workgroups(rays.len() as u32));
+            })
+        };
+        let seconds = run(&query, &bound(&query))?;
+        run(&identify, &bound(&identify))?;
         Ok((read_buffer(&gpu, &hit_buffer)?, seconds))
     }
 }

@@ -5,7 +5,7 @@ use glam::Quat;
 
 use super::Renderer;
 use crate::{
-    distribution::{Encoded, FilmFrame},
+    distribution::{Encoded, FilmFrame, TableWords},
     film::FilmOptions,
     guide::Guide,
     kernels::layout::{MAX_LAYERS, SampleLayer},
@@ -20,7 +20,8 @@ pub(super) struct Sampling {
     pub layer_count: u32,
     pub guide_first: u32,
     pub fovea_first: u32,
-    pub fovea_count: u32,
+    pub fovea_cells: u32,
+    pub fovea_cell_bits: u32,
     pub fovea_end: u32,
 }
 
@@ -40,7 +41,8 @@ impl Default for Sampling {
             layer_count: 0,
             guide_first: 0,
             fovea_first: 0,
-            fovea_count: 0,
+            fovea_cells: 0,
+            fovea_cell_bits: 0,
             fovea_end: 0,
         }
     }
@@ -70,15 +72,24 @@ impl Renderer {
         let frame = FilmFrame { options: &self.options.film, world_from_film: self.pose.world_from_film };
         let Encoded { layers, layer_count, pixels: mut words, fovea, fovea_end } =
             self.distribution.encode(key.has_fovea.then_some(frame));
+        let table = TableWords::new(&fovea, fovea_end);
         let fovea_first = words.len() as u32;
-        let fovea_count = fovea.len() as u32;
-        words.extend(fovea.into_iter().flat_map(|(bound, pixel)| [bound.min(fovea_end), pixel]));
-        words.extend([fovea_end, 0]);
+        words.extend_from_slice(table.entries.as_flattened());
+        let fovea_cells = words.len() as u32;
+        words.extend(table.cells);
         let guide_first = words.len() as u32;
         words.extend(self.guide().into_iter().flat_map(Guide::table).map(|bound| bound.to_bits()));
         self.upload_pixel_list(&words);
-        self.sampling =
-            Sampling { key: Some(key), layers, layer_count, guide_first, fovea_first, fovea_count, fovea_end };
+        self.sampling = Sampling {
+            key: Some(key),
+            layers,
+            layer_count,
+            guide_first,
+            fovea_first,
+            fovea_cells,
+            fovea_cell_bits: table.cell_bits,
+            fovea_end,
+        };
     }
 
     fn upload_pixel_list(&mut self, words: &[u32]) {
