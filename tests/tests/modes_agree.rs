@@ -281,7 +281,7 @@ fn a_position_drawn_by_the_density_is_noticed() {
                     "import package::sampling::distribution::{choose_pixel, layer_direction};",
                 ),
                 (
-                    "let direction = batch.world_from_film * direction_of_film(corner + place);",
+                    "let direction = batch.world_from_film * direction_of_film(corner_of_pixel(path.pixel) + place);",
                     "let direction = layer_direction(0u, first);",
                 ),
             ],
