@@ -2,6 +2,7 @@
 
 use serde_json::Value;
 
+use super::modes::MODES;
 use super::page::{Found, batch_secs, batches, middle, per_second, ratio, row, rows, scenes, table};
 use super::rays::KINDS;
 use super::schedules;
@@ -118,7 +119,8 @@ struct Share<'a> {
 fn generation<'a>(modes: &Found<'a>) -> Vec<Share<'a>> {
     let share = |batch: &Value| middle(&batch["generate_s"]) / batch_secs(batch);
     let each = modes.iter().flat_map(|(scene, found)| {
-        ["od", "vp", "fv"].into_iter().filter_map(move |mode| {
+        MODES.iter().filter_map(move |mode| {
+            let mode = mode.name();
             let shares: Vec<f64> = batches(found, mode).into_iter().map(share).filter(|s| s.is_finite()).collect();
             let most = shares.iter().copied().reduce(f64::max)?;
             Some(Share { scene, mode, most, usual: median(shares)? })
