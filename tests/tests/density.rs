@@ -12,7 +12,7 @@ use fovea_sampler::{
 use fovea_tests::{device, scenes, statistics};
 use glam::{Quat, Vec2, Vec3};
 use tracer::{
-    distribution::{Distribution, Gaze, Layer, View},
+    distribution::{Clip, Distribution, Gaze, Layer, View},
     film::FilmOptions,
     gpu::Gpu,
     renderer::{Renderer, RendererOptions, SequenceKind},
@@ -242,4 +242,32 @@ fn a_layer_without_its_floor_ends_at_the_cap() {
     let beyond: f64 = counts.iter().zip(&rings).filter(|(_, ring)| **ring >= 83).map(|(count, _)| count).sum();
     let inside: f64 = counts.iter().zip(&rings).filter(|(_, ring)| (70..78).contains(*ring)).map(|(c, _)| c).sum();
     assert!(inside > 1000.0 && beyond == 0.0, "{inside} samples at 70 to 78 degrees, {beyond} beyond 83");
+}
+
+/// A clip keeps samples in its view, and those that ignore it have their share everywhere.
+#[test]
+fn a_clip_keeps_samples_in_its_view() {
+    let gpu = device::gpu();
+    let film = FilmOptions::equirect(512, 256);
+    let twin = Film::equirectangular(512, 256).unwrap();
+    let turn = Quat::from_rotation_y(-0.7) * Quat::from_rotation_x(0.3);
+    let view = View { world_from_view: turn, half_extent: Vec2::new(0.6, 0.4) };
+    let gaze = Gaze::Scene { direction: view.direction(Vec2::new(0.5, -0.2)) };
+    // A pixel at the edge is partly inside.
+    let edge = View { half_extent: view.half_extent + 0.02, ..view };
+    let share_outside = |unclipped_share: Option<f32>| {
+        let clip = unclipped_share.map(|unclipped_share| Clip { view, margin: 0.0, unclipped_share });
+        let distribution = Distribution::foveated(gaze, clip, device::inverse());
+        let counts = counts(&gpu, film, (SequenceKind::Independent, 12), 1 << 18, distribution);
+        let is_outside = |pixel: usize| {
+            edge.project(vec3(twin.pixel_direction([pixel as u32 % 512, pixel as u32 / 512])))
+                .is_none_or(|point| point.abs().max_element() > 1.0)
+        };
+        let outside: f64 = counts.iter().enumerate().filter(|(i, _)| is_outside(*i)).map(|(_, count)| count).sum();
+        outside / counts.iter().sum::<f64>()
+    };
+    let [clipped, partly, free] = [Some(0.0), Some(0.25), None].map(share_outside);
+    eprintln!("outside the view: {clipped:.5} clipped, {partly:.4} with a quarter free, {free:.4} without a clip");
+    assert!(clipped < 1e-3 && free > 0.2, "{clipped}, {free}");
+    assert!((partly / (0.25 * free) - 1.0).abs() < 0.03, "{partly} of {free}");
 }

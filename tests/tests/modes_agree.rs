@@ -282,7 +282,7 @@ fn a_position_drawn_by_the_density_is_noticed() {
                 ),
                 (
                     "let direction = batch.world_from_film * direction_of_film(corner_of_pixel(path.pixel) + place);",
-                    "let direction = layer_direction(0u, first);",
+                    "let direction = batch.world_from_film * normalize(layer_direction(0u, first));",
                 ),
             ],
         )

@@ -13,6 +13,7 @@ use crate::{Geometry, Inverse};
 /// WGSL that defines, for `inverse`:
 /// - `warp_radius(u: f32) -> f32`: `1 - cos(e)` in `[0, 2]` at `u` in `[0, 1]`, floor included, for both geometries;
 /// - `warp_local(u: vec2<f32>) -> vec3<f32>`: the unit direction in the gaze's frame (+Z = gaze), azimuth `2 pi u.y`;
+/// - `local_direction(v: f32, turns: f32) -> vec3<f32>`: the unit direction with `1 - cos(e) = v` from +Z, azimuth `2 pi turns`;
 /// - `warp_cos_sin_turn(turns: f32) -> vec2<f32>`: cosine and sine of `2 pi turns` for `turns` in `[0, 1]`, to 1.2e-7;
 /// - `gaze_frame(n: vec3<f32>) -> mat3x3<f32>`: columns `b1, b2, n` (Duff et al. 2017), safe for every unit vector.
 ///
@@ -141,12 +142,14 @@ fn warp_local() -> String {
              let c = {};\n    \
              let turned = select(vec2<f32>(c, s), vec2<f32>(-s, c), quarter == 1.0f || quarter == 3.0f);\n    \
              return select(turned, -turned, quarter == 2.0f || quarter == 3.0f);\n}}\n\n\
+         // The direction at an angle from +Z whose 1 - cos is v, in [0, 2].\n\
+         fn local_direction(v: f32, turns: f32) -> vec3<f32> {{\n    \
+             let sine = sqrt(max(v * (2.0f - v), 0.0f));\n    \
+             let azimuth = warp_cos_sin_turn(turns);\n    \
+             return vec3<f32>(sine * azimuth.x, sine * azimuth.y, 1.0f - v);\n}}\n\n\
          // The direction in the gaze's frame.\n\
          fn warp_local(u: vec2<f32>) -> vec3<f32> {{\n    \
-             let v = warp_radius(u.x);\n    \
-             let sine = sqrt(max(v * (2.0f - v), 0.0f));\n    \
-             let azimuth = warp_cos_sin_turn(u.y);\n    \
-             return vec3<f32>(sine * azimuth.x, sine * azimuth.y, 1.0f - v);\n}}\n\n",
+             return local_direction(warp_radius(u.x), u.y);\n}}\n\n",
         parenthesised(horner(&SIN_TURN, "r2")),
         horner(&COS_TURN, "r2"),
     )

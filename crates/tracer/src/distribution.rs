@@ -249,10 +249,11 @@ impl Distribution {
         }
     }
 
-    /// The mixture as the kernels consume it. With `fovea`, pixels about the gaze get a table where there can be one.
-    pub(crate) fn encode(&self, fovea: Option<FilmFrame<'_>>) -> Encoded {
+    /// The mixture as the kernels consume it. With `has_fovea`, pixels about the gaze get a table where there can be one.
+    pub(crate) fn encode(&self, film: FilmFrame<'_>, has_fovea: bool) -> Encoded {
         let sum: f32 = self.layers.iter().map(|(weight, _)| weight).sum();
-        let foveas = fovea.map(|film| self.foveas(film)).unwrap_or_default();
+        let foveas = if has_fovea { self.foveas(film) } else { Vec::new() };
+        let film_from_world = Mat3::from_quat(film.world_from_film.inverse());
         let foveal = |layer: usize| foveas.iter().flat_map(|of_gaze| &of_gaze.parts).find(|part| part.layer == layer);
         let share = |layer: usize| f64::from(self.layers[layer].0 / sum);
         let mut encoded = Encoded {
@@ -276,7 +277,7 @@ impl Distribution {
             let part = foveal(at);
             let own = share(at) * (1.0 - part.map_or(0.0, |part| part.share)) * rest;
             cumulative += own;
-            *out = encode_layer(layer, part.map_or(0.0, |part| part.radius_end), &mut encoded.pixels);
+            *out = encode_layer(layer, part.map_or(0.0, |part| part.radius_end), film_from_world, &mut encoded.pixels);
             out.share = own as f32;
             out.cumulative = cumulative as f32;
         }
@@ -323,16 +324,23 @@ pub(crate) struct Encoded {
 }
 
 /// `taken`: the part of the radial inverse's range from 0 that is not the layer's.
-fn encode_layer(layer: &Layer, taken: f32, pixels: &mut Vec<u32>) -> SampleLayer {
+fn encode_layer(layer: &Layer, taken: f32, film_from_world: Mat3, pixels: &mut Vec<u32>) -> SampleLayer {
+    /// A product of two unit vectors that none exceeds.
+    const NO_LIMIT: f32 = 2.0;
+    /// Directions from the eye that are nearly parallel to the screen meet it nowhere of use.
+    const ALONG_THE_SCREEN: f32 = -1e-3;
     let mut out: SampleLayer = bytemuck::Zeroable::zeroed();
     out.clip_tries = 1;
+    out.off_screen[3] = NO_LIMIT;
     match layer {
         Layer::Film => out.kind = codes::LAYER_FILM,
-        Layer::Sphere => out.kind = codes::LAYER_SPHERE,
+        Layer::Sphere => {
+            out.kind = codes::LAYER_SPHERE;
+            out.film_from_layer = layout::columns(film_from_world);
+        }
         Layer::ImagePlane(view) => {
             out.kind = codes::LAYER_IMAGE_PLANE;
-            out.world_from_layer = layout::columns(Mat3::from_quat(view.world_from_view));
-            out.view_half_extent = view.half_extent.to_array();
+            out.film_from_layer = layout::columns(film_from_world * world_from_image_plane(view, Vec2::ONE));
         }
         Layer::Pixels(list) => {
             out.kind = codes::LAYER_PIXEL_LIST;
@@ -341,29 +349,32 @@ fn encode_layer(layer: &Layer, taken: f32, pixels: &mut Vec<u32>) -> SampleLayer
             pixels.extend_from_slice(list);
         }
         Layer::Acuity { gaze, clip, radius_scale } => {
+            out.kind = codes::LAYER_ACUITY;
             (out.radius_first, out.radius_size) = (taken, radius_scale - taken);
-            match gaze {
-                Gaze::Scene { direction } => {
-                    out.kind = codes::LAYER_GAZE;
-                    out.world_from_layer = layout::columns(gaze_frame(*direction));
-                }
+            let world_from_gaze = match gaze {
+                Gaze::Scene { direction } => gaze_frame(*direction),
+                // Gaze and sample are points on the screen: warp about the eye, then through the view.
                 Gaze::Eye { on_screen, screen_half_extent, view } => {
-                    out.kind = codes::LAYER_GAZE_AT_EYE;
                     let eye = (*on_screen * *screen_half_extent).extend(-1.0).normalize();
-                    out.screen_from_gaze = layout::columns(gaze_frame(eye));
-                    out.screen_half_extent = screen_half_extent.to_array();
-                    out.world_from_layer = layout::columns(Mat3::from_quat(view.world_from_view));
-                    out.view_half_extent = view.half_extent.to_array();
+                    let screen_from_gaze = gaze_frame(eye);
+                    out.off_screen = screen_from_gaze.row(2).extend(ALONG_THE_SCREEN).to_array();
+                    world_from_image_plane(view, *screen_half_extent) * screen_from_gaze
                 }
-            }
+            };
+            out.film_from_layer = layout::columns(film_from_world * world_from_gaze);
             if let Some(view) = clip {
                 out.clip_tries = CLIP_TRIES;
-                out.clip_half_extent = view.half_extent.to_array();
-                out.world_from_clip = layout::columns(Mat3::from_quat(view.world_from_view));
+                let world_from_clip = world_from_image_plane(view, Vec2::ONE);
+                out.clip_from_film = layout::columns((film_from_world * world_from_clip).inverse());
             }
         }
     }
     out
+}
+
+/// To the world, up to a positive factor, from (x, y, -1) for a point of a view's image plane; `edge` is the view's edge there.
+fn world_from_image_plane(view: &View, edge: Vec2) -> Mat3 {
+    Mat3::from_quat(view.world_from_view) * Mat3::from_diagonal((view.half_extent / edge).extend(1.0))
 }
 
 /// Orthonormal frame with +Z along `n` (Duff et al. 2017).
@@ -439,7 +450,7 @@ mod tests {
         let clip = Clip { view, margin: 0.0, unclipped_share: 0.0 };
         let foveated = Distribution::foveated(Gaze::Scene { direction: Vec3::NEG_Z }, Some(clip), inverse);
         let film = FilmOptions::equirect(256, 128);
-        foveated.encode(Some(FilmFrame { options: &film, world_from_film: Quat::IDENTITY }))
+        foveated.encode(FilmFrame { options: &film, world_from_film: Quat::IDENTITY }, true)
     }
 
     /// Of the layer only corners beyond the table lie in a view that just holds the rim: most samples are the table's, not all.

@@ -10,7 +10,7 @@ use crate::upload::decode_octahedral;
 /// A 3x3 matrix as a uniform holds it: columns of four.
 pub type Columns3 = [[f32; 4]; 3];
 
-/// Columns of a rotation matrix.
+/// Columns of a matrix.
 pub fn columns(m: glam::Mat3) -> Columns3 {
     [m.x_axis.extend(0.0).to_array(), m.y_axis.extend(0.0).to_array(), m.z_axis.extend(0.0).to_array()]
 }
@@ -61,17 +61,13 @@ shared! {
         cumulative: f32,
         share: f32,
         clip_tries: u32,
-        world_from_layer: Columns3,
-        screen_from_gaze: Columns3,
-        view_half_extent: [f32; 2],
-        screen_half_extent: [f32; 2],
-        clip_half_extent: [f32; 2],
+        film_from_layer: Columns3,
+        clip_from_film: Columns3,
+        off_screen: [f32; 4],
         list_first: u32,
         list_count: u32,
         radius_first: f32,
         radius_size: f32,
-        pad_0: [u32; 2],
-        world_from_clip: Columns3,
     }
 
     /// One batch of samples.
@@ -380,11 +376,10 @@ pub const MAX_LAYERS: usize = 8;
 pub mod codes {
     #![expect(missing_docs, reason = "named as in the shader")]
     pub const LAYER_FILM: u32 = 0;
-    pub const LAYER_SPHERE: u32 = 1;
+    pub const LAYER_PIXEL_LIST: u32 = 1;
     pub const LAYER_IMAGE_PLANE: u32 = 2;
-    pub const LAYER_PIXEL_LIST: u32 = 3;
-    pub const LAYER_GAZE: u32 = 4;
-    pub const LAYER_GAZE_AT_EYE: u32 = 5;
+    pub const LAYER_SPHERE: u32 = 3;
+    pub const LAYER_ACUITY: u32 = 4;
     pub const RAY_CLOSEST: u32 = 1;
     pub const RAY_ANY: u32 = 2;
     pub const NONE: u32 = u32::MAX;

@@ -71,7 +71,7 @@ impl Renderer {
         }
         let frame = FilmFrame { options: &self.options.film, world_from_film: self.pose.world_from_film };
         let Encoded { layers, layer_count, pixels: mut words, fovea, fovea_end } =
-            self.distribution.encode(key.has_fovea.then_some(frame));
+            self.distribution.encode(frame, key.has_fovea);
         let table = TableWords::new(&fovea, fovea_end);
         let fovea_first = words.len() as u32;
         words.extend_from_slice(table.entries.as_flattened());

@@ -5,7 +5,7 @@ use glam::{Mat3, Quat, Vec3};
 
 use super::{FilmPose, RenderError, Renderer, schedule::PathBatch};
 use crate::{
-    distribution::Distribution,
+    distribution::{Distribution, FilmFrame},
     film::read_ranges,
     kernels::layout::{self, BatchParams, SampleRecord},
     scene::Scene,
@@ -47,7 +47,8 @@ impl Renderer {
     /// Mean luminance over the film with this many bounces and the environment's radiance times a factor.
     fn pilot(&self, pose: FilmPose, max_bounces: u32, environment: f32) -> Result<f64, RenderError> {
         let everywhere = Distribution::omnidirectional(self.distribution.inverse().clone());
-        let encoded = everywhere.encode(None);
+        let film = FilmFrame { options: &self.options.film, world_from_film: pose.world_from_film };
+        let encoded = everywhere.encode(film, false);
         let next = self.batch_params(PILOT_SAMPLES)?;
         let params = BatchParams {
             first_index_low: 0,
