@@ -161,7 +161,7 @@ fn the_fovea_follows_the_pointer_and_most_of_the_time_goes_into_tracing() {
     };
     let (left, right, y) = (480, 1060, 420);
     for (gaze, other) in [(left, right), (right, left)] {
-        let (shown, figures) = display.session(8, &[], |display| {
+        let (shown, figures) = display.session(12, &[], |display| {
             display.xdotool(&format!("mousemove {gaze} {y}"));
             std::thread::sleep(Duration::from_millis(500));
             // The film starts again, so that nothing in it is older than the gaze; the picture shows its density.

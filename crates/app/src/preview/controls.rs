@@ -1,6 +1,6 @@
 //! What a person can set in the window, and what the window tells them.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tracer::view::DebugView;
 
@@ -92,6 +92,8 @@ pub struct Readout {
     pub elapsed: Duration,
     /// Time spent tracing since the window opened.
     pub traced: Duration,
+    /// When that was read; `None` before the first picture.
+    pub read_at: Option<Instant>,
     /// Samples that were not finite and were dropped.
     pub non_finite_dropped: u64,
     /// What is known about the picture as it was last shown.

@@ -426,7 +426,7 @@ impl Worker {
             self.non_finite_dropped = self.tracing.non_finite_dropped()?;
             self.read_at = Some(Instant::now());
         }
-        let (readout, film) = (self.readout(), self.film_words());
+        let (readout, film) = (self.readout(), self.tracing.film_words());
         let version = self.tracing.scene_report().map(|(report, took)| ShownVersion::new(self.versions, report, took));
         let mut state = lock(&self.shared.state);
         (state.picture, state.is_sketch) = (Some(picture), false);
@@ -450,14 +450,10 @@ impl Worker {
             convergence: self.convergence,
             elapsed: self.tracing.elapsed(),
             traced: self.traced,
+            read_at: Some(Instant::now()),
             non_finite_dropped: self.non_finite_dropped,
             seen: self.tracing.seen(),
         }
-    }
-
-    /// The film's size, such as `4096x2048`.
-    fn film_words(&self) -> String {
-        self.tracing.film_size().map(|[width, height]| format!("{width}x{height}")).unwrap_or_default()
     }
 
     /// The next request, waiting a little for one when there is nothing to trace.

@@ -29,8 +29,8 @@ pub struct Screenshot {
     outcome: Outcome,
     /// When the first picture came.
     since: Option<Instant>,
-    /// Halfway from there to the screenshot, when shaders are compiled and rates have settled: when it was, and the time
-    /// spent tracing until then.
+    /// The first reading after halfway from there to the screenshot, when shaders are compiled and rates have settled: when it was,
+    /// and the time spent tracing until then.
     halfway: Option<(Instant, Duration)>,
     asked: bool,
     /// Since then.
@@ -84,7 +84,7 @@ impl Screenshot {
         let now = Instant::now();
         let since = *self.since.get_or_insert(now);
         if since.elapsed() >= self.after / 2 {
-            let _ = self.halfway.get_or_insert((now, state.readout.traced));
+            self.halfway = self.halfway.or(state.readout.read_at.map(|at| (at, state.readout.traced)));
         }
         let held = ctx.input(|input| input.pointer.any_down());
         self.frames.frame(now, held);
@@ -111,7 +111,9 @@ impl Screenshot {
     fn figures(&self, state: &State, more: Value) -> Value {
         let readout = &state.readout;
         let now = Instant::now();
+        // Readings are as far apart as pictures, so that the share is of the time between two of them.
         let (halfway, traced) = self.halfway.unwrap_or((now, readout.traced));
+        let read = readout.read_at.map_or(Duration::ZERO, |at| at.saturating_duration_since(halfway));
         let tracing = readout.traced.saturating_sub(traced).as_secs_f64();
         let mut figures = json!({
             "samples": readout.samples,
@@ -119,7 +121,7 @@ impl Screenshot {
             "samples_per_s": readout.samples_per_s,
             "spp_at_gaze": readout.spp_at_gaze,
             "elapsed_s": readout.elapsed.as_secs_f64(),
-            "tracing_share": tracing / (now - halfway).as_secs_f64().max(1e-9),
+            "tracing_share": tracing / read.as_secs_f64().max(1e-9),
             "shown_s": self.since.map_or(0.0, |since| (now - since).as_secs_f64()),
             "frames": self.frames.figures(),
             "film": state.film,

@@ -183,10 +183,10 @@ impl Tracing {
         Ok(TevPicture { size, rgb: texels.iter().flat_map(|[r, g, b, _]| [*r, *g, *b]).collect() })
     }
 
-    /// Film pixels across and down.
-    pub fn film_size(&self) -> Option<[u32; 2]> {
-        let plan = self.open.as_ref()?.plan?;
-        Some([plan.options.width, plan.options.height])
+    /// The film's size, such as `4096x2048`; empty before there is a film.
+    pub fn film_words(&self) -> String {
+        let plan = self.open.as_ref().and_then(|open| open.plan);
+        plan.map(|plan| format!("{}x{}", plan.options.width, plan.options.height)).unwrap_or_default()
     }
 
     /// How kernels share the work of a path; empty before there is a film.

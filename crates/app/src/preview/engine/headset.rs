@@ -228,7 +228,7 @@ impl Worker {
         let block = self.tracing.block_at(gaze)?;
         self.convergence = self.follower.update(gaze, block, self.tracing.elapsed());
         let figures = self.readout();
-        let film = self.film_words();
+        let film = self.tracing.film_words();
         let mut state = lock(&self.shared.state);
         state.picture = Some(picture);
         state.readout = figures;
