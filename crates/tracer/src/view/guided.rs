@@ -6,8 +6,8 @@
 //! gives to and takes from places that are alike in normal and tangent plane. The variance of samples comes along, from the film's
 //! second moments, pooled with that of the coarser level. And a level's own mean is weighed against its surroundings by shrinkage:
 //! its weight is signal / (signal + noise), where noise is the variance over the samples, and signal is what the two differ by beyond
-//! noise, what the surroundings are unsure of, and at least what the surface may vary. So the width follows density and variance,
-//! and with many samples the view becomes the film.
+//! noise, what places around differ by at the next coarser level, what the surroundings are unsure of, and at least what the surface
+//! may vary. So the width follows density and variance, and with many samples the view becomes the film.
 
 use super::HitsOf;
 use crate::{
@@ -39,7 +39,7 @@ impl Guides {
             })
         };
         let guides = Some(buffer("guides", size_of::<Guide>() as u64));
-        Self { of, guides, ties: buffer("ties", 8), moments: buffer("moments", 4) }
+        Self { of, guides, ties: buffer("ties", 8), moments: buffer("moments", 8) }
     }
 
     /// The ties are still to be made.
