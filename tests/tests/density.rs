@@ -19,7 +19,7 @@ use tracer::{
 };
 
 /// Chi-squared tests in this file.
-const TESTS: usize = 14;
+const TESTS: usize = 15;
 const FAMILY_SIGNIFICANCE: f64 = 0.01;
 const SAMPLES: u64 = 1 << 21;
 
@@ -244,30 +244,49 @@ fn a_layer_without_its_floor_ends_at_the_cap() {
     assert!(inside > 1000.0 && beyond == 0.0, "{inside} samples at 70 to 78 degrees, {beyond} beyond 83");
 }
 
-/// A clip keeps samples in its view, and those that ignore it have their share everywhere.
+/// A clip keeps samples in its view, where they follow the model as without one; those that ignore it have their share everywhere.
 #[test]
 fn a_clip_keeps_samples_in_its_view() {
     let gpu = device::gpu();
-    let film = FilmOptions::equirect(512, 256);
-    let twin = Film::equirectangular(512, 256).unwrap();
+    let film = FilmOptions::equirect(256, 128);
+    let twin = Film::equirectangular(256, 128).unwrap();
+    let acuity = device::acuity();
     let turn = Quat::from_rotation_y(-0.7) * Quat::from_rotation_x(0.3);
     let view = View { world_from_view: turn, half_extent: Vec2::new(0.6, 0.4) };
-    let gaze = Gaze::Scene { direction: view.direction(Vec2::new(0.5, -0.2)) };
-    // A pixel at the edge is partly inside.
-    let edge = View { half_extent: view.half_extent + 0.02, ..view };
-    let share_outside = |unclipped_share: Option<f32>| {
+    let direction = view.direction(Vec2::new(0.5, -0.2));
+    let counted = |unclipped_share: Option<f32>| {
         let clip = unclipped_share.map(|unclipped_share| Clip { view, margin: 0.0, unclipped_share });
-        let distribution = Distribution::foveated(gaze, clip, device::inverse());
-        let counts = counts(&gpu, film, (SequenceKind::Independent, 12), 1 << 18, distribution);
-        let is_outside = |pixel: usize| {
-            edge.project(vec3(twin.pixel_direction([pixel as u32 % 512, pixel as u32 / 512])))
-                .is_none_or(|point| point.abs().max_element() > 1.0)
-        };
-        let outside: f64 = counts.iter().enumerate().filter(|(i, _)| is_outside(*i)).map(|(_, count)| count).sum();
-        outside / counts.iter().sum::<f64>()
+        let distribution = Distribution::foveated(Gaze::Scene { direction }, clip, device::inverse());
+        counts(&gpu, film, (SequenceKind::Independent, 12), SAMPLES, distribution)
     };
-    let [clipped, partly, free] = [Some(0.0), Some(0.25), None].map(share_outside);
+    // By how far a pixel is inside or outside of the edge, in units of the image plane.
+    let is_within = |pixel: usize, beyond_edge: f32| {
+        let edge = View { half_extent: view.half_extent + beyond_edge, ..view };
+        edge.project(vec3(twin.pixel_direction([pixel as u32 % 256, pixel as u32 / 256])))
+            .is_some_and(|point| point.abs().max_element() <= 1.0)
+    };
+    let all = [Some(0.0), Some(0.25), None].map(counted);
+    let [clipped, partly, free] = [0, 1, 2].map(|k| {
+        let outside = all[k].iter().enumerate().filter(|(pixel, _)| !is_within(*pixel, 0.04));
+        outside.map(|(_, count)| count).sum::<f64>() / SAMPLES as f64
+    });
     eprintln!("outside the view: {clipped:.5} clipped, {partly:.4} with a quarter free, {free:.4} without a clip");
     assert!(clipped < 1e-3 && free > 0.2, "{clipped}, {free}");
     assert!((partly / (0.25 * free) - 1.0).abs() < 0.03, "{partly} of {free}");
+    // Pixels wholly inside, up to the corner that is farthest from the gaze.
+    let density = |d| acuity.pdf(Angle::from_degrees(angle_deg(d, glam::DVec3::from(direction).into())));
+    let whole = probabilities(&twin, density);
+    let inside: Vec<usize> = (0..whole.len()).filter(|pixel| is_within(*pixel, -0.04)).collect();
+    let [seen, sum] = [&all[0], &whole].map(|values| inside.iter().map(|&pixel| values[pixel]).sum::<f64>());
+    let expected: Vec<f64> = inside.iter().map(|&pixel| whole[pixel] / sum * seen).collect();
+    let found: Vec<f64> = inside.iter().map(|&pixel| all[0][pixel]).collect();
+    let (p, statistic, freedom) = statistics::chi_squared_test(&found, &expected);
+    eprintln!("clipped, by pixel: chi-squared {statistic:.1} with {freedom} degrees of freedom, p = {p:.3}");
+    assert!(p > statistics::sidak(FAMILY_SIGNIFICANCE, TESTS));
+    // Two degrees off it would be seen.
+    let shifted = |d: Direction| density((Quat::from_rotation_y(2f32.to_radians()) * vec3(d)).as_dvec3().into());
+    let shifted = probabilities(&twin, shifted);
+    let sum: f64 = inside.iter().map(|&pixel| shifted[pixel]).sum();
+    let wrong: Vec<f64> = inside.iter().map(|&pixel| shifted[pixel] / sum * seen).collect();
+    assert!(statistics::chi_squared_test(&found, &wrong).0 < 1e-12);
 }

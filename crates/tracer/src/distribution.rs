@@ -3,7 +3,7 @@
 //! The density chooses the pixel; the position inside it is drawn afresh and uniform, so every distribution converges
 //! to the same value in every pixel that it gives density to.
 
-use std::{f64::consts::PI, sync::Arc};
+use std::{f64::consts::PI, ops::Range, sync::Arc};
 
 use fovea_sampler::Inverse;
 use glam::{Mat3, Quat, Vec2, Vec3};
@@ -11,8 +11,8 @@ use rayon::prelude::*;
 
 mod fovea;
 
-use fovea::Fovea;
 pub(crate) use fovea::TableWords;
+use fovea::{Fovea, range_within};
 
 use crate::{
     film::{FilmMapping, FilmOptions},
@@ -70,6 +70,23 @@ pub enum Gaze {
         /// What the screen shows.
         view: View,
     },
+}
+
+impl Gaze {
+    /// Versine, 1 - cos, of the eccentricity of a view's corner that is farthest from the gaze. `None` where some place inside may
+    /// be farther: that takes a corner at more than a right angle.
+    fn farthest_corner(&self, clip: &View) -> Option<f32> {
+        let corners = [Vec2::new(1.0, 1.0), Vec2::new(1.0, -1.0), Vec2::new(-1.0, 1.0), Vec2::new(-1.0, -1.0)];
+        let cosine = |corner: Vec2| match self {
+            Self::Scene { direction } => Some(direction.dot(clip.direction(corner))),
+            Self::Eye { on_screen, screen_half_extent, view } => {
+                let at_eye = |point: Vec2| (point * *screen_half_extent).extend(-1.0).normalize();
+                Some(at_eye(*on_screen).dot(at_eye(view.project(clip.direction(corner))?)))
+            }
+        };
+        let least = corners.into_iter().map(cosine).try_fold(1.0f32, |least, cosine| Some(least.min(cosine?)))?;
+        (least > 0.0).then_some(1.0 - least)
+    }
 }
 
 /// Keeps most samples of a layer inside a view.
@@ -277,11 +294,23 @@ impl Distribution {
             let part = foveal(at);
             let own = share(at) * (1.0 - part.map_or(0.0, |part| part.share)) * rest;
             cumulative += own;
-            *out = encode_layer(layer, part.map_or(0.0, |part| part.radius_end), film_from_world, &mut encoded.pixels);
+            let taken = part.map_or(0.0, |part| part.radius_end);
+            let reach = taken..self.radius_of_interest(layer);
+            *out = encode_layer(layer, reach, film_from_world, &mut encoded.pixels);
             out.share = own as f32;
             out.cumulative = cumulative as f32;
         }
         encoded
+    }
+
+    /// Where a layer's part of the radial inverse's range ends: candidates beyond the farthest corner of a clip would all be drawn
+    /// again.
+    fn radius_of_interest(&self, layer: &Layer) -> f32 {
+        /// What rounding may move a corner by, of the range.
+        const MARGIN: f32 = 1e-4;
+        let Layer::Acuity { gaze, clip, radius_scale } = layer else { return 0.0 };
+        let Some(farthest) = clip.as_ref().and_then(|view| gaze.farthest_corner(view)) else { return *radius_scale };
+        (range_within(&self.inverse, farthest) + MARGIN).min(*radius_scale)
     }
 
     /// The foveas of the mixture's acuity layers, one a gaze.
@@ -323,8 +352,8 @@ pub(crate) struct Encoded {
     pub fovea_end: u32,
 }
 
-/// `taken`: the part of the radial inverse's range from 0 that is not the layer's.
-fn encode_layer(layer: &Layer, taken: f32, film_from_world: Mat3, pixels: &mut Vec<u32>) -> SampleLayer {
+/// `reach`: of an acuity layer, the part of the radial inverse's range that it draws from.
+fn encode_layer(layer: &Layer, reach: Range<f32>, film_from_world: Mat3, pixels: &mut Vec<u32>) -> SampleLayer {
     /// A product of two unit vectors that none exceeds.
     const NO_LIMIT: f32 = 2.0;
     /// Directions from the eye that are nearly parallel to the screen meet it nowhere of use.
@@ -348,9 +377,9 @@ fn encode_layer(layer: &Layer, taken: f32, film_from_world: Mat3, pixels: &mut V
             out.list_count = list.len() as u32;
             pixels.extend_from_slice(list);
         }
-        Layer::Acuity { gaze, clip, radius_scale } => {
+        Layer::Acuity { gaze, clip, .. } => {
             out.kind = codes::LAYER_ACUITY;
-            (out.radius_first, out.radius_size) = (taken, radius_scale - taken);
+            (out.radius_first, out.radius_size) = (reach.start, reach.end - reach.start);
             let world_from_gaze = match gaze {
                 Gaze::Scene { direction } => gaze_frame(*direction),
                 // Gaze and sample are points on the screen: warp about the eye, then through the view.

@@ -196,7 +196,7 @@ fn screen_from_gaze(on_screen: Vec2) -> Mat3 {
 }
 
 /// How much of the radial inverse's range lies within a radius.
-fn range_within(inverse: &Inverse, versine: f32) -> f32 {
+pub(super) fn range_within(inverse: &Inverse, versine: f32) -> f32 {
     let (mut low, mut high) = (0.0f32, 1.0f32);
     for _ in 0..30 {
         let middle = 0.5 * (low + high);
