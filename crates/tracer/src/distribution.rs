@@ -22,6 +22,9 @@ use crate::{
 /// Candidates drawn before a clipped layer accepts one outside.
 const CLIP_TRIES: u32 = 16;
 
+/// Z of directions from the eye above which they are too nearly parallel to the screen to meet it anywhere of use.
+const ALONG_THE_SCREEN: f32 = -1e-3;
+
 /// Strata that make up a pixel where most samples fall: with one the gain in the fovea is two thirds of that with four or eight
 /// (docs/reports/sequence.md).
 const STRATA_OF_A_PIXEL: f64 = 4.0;
@@ -80,8 +83,8 @@ impl Gaze {
         let cosine = |corner: Vec2| match self {
             Self::Scene { direction } => Some(direction.dot(clip.direction(corner))),
             Self::Eye { on_screen, screen_half_extent, view } => {
-                let at_eye = |point: Vec2| (point * *screen_half_extent).extend(-1.0).normalize();
-                Some(at_eye(*on_screen).dot(at_eye(view.project(clip.direction(corner))?)))
+                let corner = at_eye(view.project(clip.direction(corner))?, *screen_half_extent);
+                Some(at_eye(*on_screen, *screen_half_extent).dot(corner))
             }
         };
         let least = corners.into_iter().map(cosine).try_fold(1.0f32, |least, cosine| Some(least.min(cosine?)))?;
@@ -356,8 +359,6 @@ pub(crate) struct Encoded {
 fn encode_layer(layer: &Layer, reach: Range<f32>, film_from_world: Mat3, pixels: &mut Vec<u32>) -> SampleLayer {
     /// A product of two unit vectors that none exceeds.
     const NO_LIMIT: f32 = 2.0;
-    /// Directions from the eye that are nearly parallel to the screen meet it nowhere of use.
-    const ALONG_THE_SCREEN: f32 = -1e-3;
     let mut out: SampleLayer = bytemuck::Zeroable::zeroed();
     out.clip_tries = 1;
     out.off_screen[3] = NO_LIMIT;
@@ -384,8 +385,7 @@ fn encode_layer(layer: &Layer, reach: Range<f32>, film_from_world: Mat3, pixels:
                 Gaze::Scene { direction } => gaze_frame(*direction),
                 // Gaze and sample are points on the screen: warp about the eye, then through the view.
                 Gaze::Eye { on_screen, screen_half_extent, view } => {
-                    let eye = (*on_screen * *screen_half_extent).extend(-1.0).normalize();
-                    let screen_from_gaze = gaze_frame(eye);
+                    let screen_from_gaze = gaze_frame(at_eye(*on_screen, *screen_half_extent));
                     out.off_screen = screen_from_gaze.row(2).extend(ALONG_THE_SCREEN).to_array();
                     world_from_image_plane(view, *screen_half_extent) * screen_from_gaze
                 }
@@ -399,6 +399,11 @@ fn encode_layer(layer: &Layer, reach: Range<f32>, film_from_world: Mat3, pixels:
         }
     }
     out
+}
+
+/// Direction from the eye, in the screen's frame, to a point of the screen in units of its half extent.
+fn at_eye(on_screen: Vec2, screen_half_extent: Vec2) -> Vec3 {
+    (on_screen * screen_half_extent).extend(-1.0).normalize()
 }
 
 /// To the world, up to a positive factor, from (x, y, -1) for a point of a view's image plane; `edge` is the view's edge there.

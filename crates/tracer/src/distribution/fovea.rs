@@ -8,10 +8,13 @@
 use std::f64::consts::{PI, TAU};
 
 use fovea_sampler::{Inverse, sequence::IntervalEnd};
-use glam::{Mat3, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::{FilmFrame, Gaze, View, column_part, direction_of_parts, gaze_frame, place_direction, row_part};
+use super::{
+    ALONG_THE_SCREEN, FilmFrame, Gaze, View, at_eye, column_part, direction_of_parts, gaze_frame, place_direction,
+    row_part,
+};
 use crate::film::{FilmMapping, FilmOptions};
 
 /// Eccentricity within which pixels have a table: where Reddy's acuity is flat.
@@ -185,14 +188,10 @@ fn direction(gaze: &Gaze, versine: f32, turns: f32) -> Option<Vec3> {
     match gaze {
         Gaze::Scene { direction } => Some(gaze_frame(*direction) * local),
         Gaze::Eye { on_screen, screen_half_extent, view } => {
-            let d = screen_from_gaze(*on_screen * *screen_half_extent) * local;
-            (d.z < -1e-3).then(|| view.direction(d.truncate() / (-d.z * *screen_half_extent)))
+            let d = gaze_frame(at_eye(*on_screen, *screen_half_extent)) * local;
+            (d.z < ALONG_THE_SCREEN).then(|| view.direction(d.truncate() / (-d.z * *screen_half_extent)))
         }
     }
-}
-
-fn screen_from_gaze(on_screen: Vec2) -> Mat3 {
-    gaze_frame(on_screen.extend(-1.0).normalize())
 }
 
 /// How much of the radial inverse's range lies within a radius.
