@@ -122,7 +122,6 @@ impl Screenshot {
             "spp_at_gaze": readout.spp_at_gaze,
             "elapsed_s": readout.elapsed.as_secs_f64(),
             "tracing_share": tracing / read.as_secs_f64().max(1e-9),
-            "reading_age_s": readout.read_at.map(|at| now.saturating_duration_since(at).as_secs_f64()),
             "shown_s": self.since.map_or(0.0, |since| (now - since).as_secs_f64()),
             "frames": self.frames.figures(),
             "film": state.film,
