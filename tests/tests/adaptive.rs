@@ -2,12 +2,13 @@
 //! depend on the batches, and gazes that move.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::f32::consts::FRAC_PI_4;
+use std::f32::consts::{FRAC_PI_4, PI, TAU};
 
+use fovea_sampler::Inverse;
 use fovea_tests::{device, plant::exchanged, scenes, statistics};
-use glam::{Quat, Vec3};
+use glam::{Mat3, Quat, Vec3};
 use tracer::{
-    distribution::{Distribution, Gaze},
+    distribution::{Distribution, Gaze, gaze_frame},
     film::{FilmOptions, FilmSnapshot},
     gpu::Gpu,
     guide::{FLOOR, GUIDE_COLUMNS_PER_ROW, Guide},
@@ -59,7 +60,7 @@ fn a_guide_gives_each_cell_its_density_and_the_least_its_floor() {
     let everywhere = Distribution::omnidirectional(device::inverse());
     let mut renderer = device::independent(&gpu, FILM, 5, 0, everywhere, &scenes::empty(Vec3::ONE));
     let guide = uneven(8);
-    let densities = guide.densities();
+    let densities = guide.densities().to_vec();
     let least = densities.iter().copied().fold(f32::MAX, f32::min);
     assert!((least - FLOOR).abs() < 1e-3, "the least density is {least}");
     renderer.set_guide(Some(guide));
@@ -71,6 +72,80 @@ fn a_guide_gives_each_cell_its_density_and_the_least_its_floor() {
     renderer.restart();
     let even = device::trace(&mut renderer, 1 << 18).unwrap();
     assert!(fit(&even, &[1.0; 256], 8) > SIGNIFICANCE);
+}
+
+/// A place in FV's unit square: how far up in the radial inverse's range a direction lies, and its azimuth in turns. The gaze's frame
+/// is twisted against the film's.
+fn place_about_gaze(d: Vec3, frame: &Mat3, inverse: &Inverse) -> [f32; 2] {
+    let local = frame.transpose() * d;
+    let versine = 0.5 * (d - frame.z_axis).length_squared();
+    let (mut low, mut high) = (0.0f32, 1.0f32);
+    for _ in 0..30 {
+        let middle = 0.5 * (low + high);
+        if inverse.eval_versine(middle) < versine { low = middle } else { high = middle }
+    }
+    [low, (local.y.atan2(local.x) / TAU).rem_euclid(1.0)]
+}
+
+/// Pixels about the gaze are chosen from a table, all others by the layer: one guide is for both. Counts of FV with a guide against
+/// counts without, times the densities of the pixels' cells. The last of nine groups has all pixels that are not wholly within cells of
+/// one density.
+#[test]
+fn a_guide_moves_samples_of_the_table_about_the_gaze_as_well_as_of_the_layer() {
+    const FILM: FilmOptions = FilmOptions::equirect(512, 256);
+    const ROWS: u32 = 8;
+    const COLUMNS: u32 = ROWS * GUIDE_COLUMNS_PER_ROW;
+    /// Plain samples over guided ones.
+    const PLAIN: u64 = 4;
+    let _time = device::Stopwatch::start("densities about the gaze");
+    let gpu = device::gpu();
+    let inverse = device::inverse();
+    let gaze = Vec3::new(0.3, 0.2, -1.0).normalize();
+    let mut renderer = device::independent(&gpu, FILM, 5, 0, foveated(gaze), &scenes::empty(Vec3::ONE));
+    let plain = device::trace(&mut renderer, PLAIN << 18).unwrap();
+    // A density for each quarter of the azimuth in each half of the samples: the nearer half is the table's and some of the layer's.
+    let group = |[x, y]: [f32; 2]| 4 * usize::from(x >= 0.5) + (4.0 * y) as usize;
+    let weight = |cell: u32| {
+        let place = [(cell / ROWS) as f32 + 0.5, (cell % ROWS) as f32 + 0.5];
+        [8.0, 1.0, 3.0, 0.0, 1.0, 4.0, 0.0, 2.0][group([place[0] / COLUMNS as f32, place[1] / ROWS as f32])]
+    };
+    let weights: Vec<f32> = (0..COLUMNS * ROWS).map(weight).collect();
+    let guide = Guide::from_weights(&weights, ROWS).unwrap();
+    let densities: Vec<f64> =
+        (0..8).map(|k| f64::from(guide.densities()[(16 * (k / 4) * ROWS + 2 * (k % 4)) as usize])).collect();
+    renderer.restart();
+    renderer.set_guide(Some(guide));
+    let guided = device::trace(&mut renderer, 1 << 18).unwrap();
+
+    let frame = gaze_frame(gaze);
+    let is_near = |place: [f32; 2]| (place[0] - 0.5).abs() < 1.0 / COLUMNS as f32;
+    let mut sums = [[0.0; 2]; 9];
+    for (index, (with, without)) in (0..).zip(guided.pixels().zip(plain.pixels())) {
+        let (x, y) = ((index % FILM.width) as f32, (index / FILM.width) as f32);
+        let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(|[dx, dy]| {
+            let (sin, cos) = (TAU * ((x + dx) / FILM.width as f32 - 0.5)).sin_cos();
+            let (up, across) = (PI * (0.5 - (y + dy) / FILM.height as f32)).sin_cos();
+            place_about_gaze(Vec3::new(across * sin, up, -across * cos), &frame, &inverse)
+        });
+        let groups = corners.map(group);
+        let is_whole = groups.iter().all(|&other| other == groups[0]) && !corners.iter().any(|&place| is_near(place));
+        let sums = &mut sums[if is_whole { groups[0] } else { 8 }];
+        sums[0] += f64::from(with.samples);
+        sums[1] += f64::from(without.samples) / PLAIN as f64;
+    }
+    let p = |densities: &[f64]| {
+        let of_group = |(&[with, without], density): (&[f64; 2], &f64)| {
+            let expected = density * without;
+            (with - expected).powi(2) / (expected + density * expected / PLAIN as f64)
+        };
+        statistics::chi_squared_p(sums.iter().zip(densities).map(of_group).sum(), 8)
+    };
+    assert!(sums[..8].iter().all(|[_, without]| *without > 2000.0), "too few pixels in a group: {sums:?}");
+    eprintln!("{sums:?} by {densities:?}: p = {}", p(&densities));
+    assert!(p(&densities) > SIGNIFICANCE);
+    let mut others = densities.clone();
+    others[0] *= 1.05;
+    assert!(p(&others) < NOTICED, "this test notices a density that is 5 % off");
 }
 
 /// Mean luminance about the gaze and farther away, seed by seed, of films that `guided` has a hand in.
@@ -121,26 +196,10 @@ fn means_stay_unbiased_while_another_film_steers_and_a_weighted_sample_is_notice
     let p = least_p(&guided, &plain);
     assert!(p > SIGNIFICANCE, "p = {p}");
 
-    // A sample weighted by where the guide put it: what an estimator that needs the density would get wrong.
+    // A sample weighted by where it was put: what an estimator that needs the density would get wrong.
     let weighted = |sources: &ShaderSources| {
-        exchanged(
-            sources,
-            "path::start",
-            &[
-                (
-                    "path.pixel = choose_pixel(first_random_2(&random), random);",
-                    "let first = first_random_2(&random);\n    path.pixel = choose_pixel(first, random);",
-                ),
-                (
-                    "path.throughput = vec3f(1.0);",
-                    "path.throughput = vec3f(select(1.0, 1.05, guided(first).x > first.x));",
-                ),
-                (
-                    "import package::sampling::distribution::choose_pixel;",
-                    "import package::sampling::distribution::choose_pixel;\nimport package::sampling::guide::guided;",
-                ),
-            ],
-        )
+        let fault = "path.throughput = vec3f(select(1.0, 1.05, path.pixel % 2u == 0u));";
+        exchanged(sources, "path::start", &[("path.throughput = vec3f(1.0);", fault)])
     };
     let faulty = means(&gpu, 200..224, |shown| {
         shown.set_shaders(weighted(&ShaderSources::new(&device::inverse()))).unwrap();

@@ -10,12 +10,15 @@ use glam::{Mat3, Quat, Vec2, Vec3};
 use rayon::prelude::*;
 
 mod fovea;
+mod guided;
 
 pub(crate) use fovea::TableWords;
 use fovea::{Fovea, range_within};
+use guided::Extent;
 
 use crate::{
     film::{FilmMapping, FilmOptions},
+    guide::Guide,
     kernels::layout::{self, MAX_LAYERS, SampleLayer, codes},
 };
 
@@ -270,40 +273,60 @@ impl Distribution {
     }
 
     /// The mixture as the kernels consume it. With `has_fovea`, pixels about the gaze get a table where there can be one.
-    pub(crate) fn encode(&self, film: FilmFrame<'_>, has_fovea: bool) -> Encoded {
-        let sum: f32 = self.layers.iter().map(|(weight, _)| weight).sum();
-        let foveas = if has_fovea { self.foveas(film) } else { Vec::new() };
+    pub(crate) fn encode(&self, film: FilmFrame<'_>, has_fovea: bool, guide: Option<&Guide>) -> Encoded {
+        let mut foveas = if has_fovea { self.foveas(film) } else { Vec::new() };
+        let extents = self.extents(&foveas);
+        let guided = guide.map(|guide| guided::guided(guide, &mut foveas, &extents, &self.inverse, film));
         let film_from_world = Mat3::from_quat(film.world_from_film.inverse());
-        let foveal = |layer: usize| foveas.iter().flat_map(|of_gaze| &of_gaze.parts).find(|part| part.layer == layer);
-        let share = |layer: usize| f64::from(self.layers[layer].0 / sum);
         let mut encoded = Encoded {
             layers: bytemuck::Zeroable::zeroed(),
             layer_count: self.layers.len().min(MAX_LAYERS) as u32,
             pixels: Vec::new(),
             fovea: Vec::new(),
             fovea_end: 0,
+            guide: None,
         };
         let mut tabled = 0.0;
-        for of_gaze in &foveas {
-            let own: f64 = of_gaze.parts.iter().map(|part| share(part.layer) * part.share).sum();
+        for (at, of_gaze) in foveas.iter().enumerate() {
+            let share: f64 = of_gaze.parts.iter().map(|part| extents[part.layer].tabled).sum();
+            let own = share * guided.as_ref().map_or(1.0, |guided| guided.tables[at]);
             encoded.fovea.extend(of_gaze.pixels.intervals(tabled, own));
             tabled += own;
         }
+        encoded.guide = guided.map(|guided| guided.rest);
         // A multiple of 2^8: floats of 24 bits tell the table from the layers.
         encoded.fovea_end = (tabled * 2f64.powi(24)).round() as u32 * 256;
         let mut cumulative = f64::from(encoded.fovea_end) * 2f64.powi(-32);
-        let rest = (1.0 - cumulative) / (1.0 - tabled);
-        for (at, (layer, out)) in self.layers.iter().map(|(_, layer)| layer).zip(&mut encoded.layers).enumerate() {
-            let part = foveal(at);
-            let own = share(at) * (1.0 - part.map_or(0.0, |part| part.share)) * rest;
+        let kept: f64 = extents.iter().map(|extent| extent.kept).sum();
+        let rest = (1.0 - cumulative) / kept;
+        for (((_, layer), extent), out) in self.layers.iter().zip(&extents).zip(&mut encoded.layers) {
+            let own = extent.kept * rest;
             cumulative += own;
-            let taken = part.map_or(0.0, |part| part.radius_end);
-            let reach = taken..self.radius_of_interest(layer);
+            let reach = extent.taken as f32..self.radius_of_interest(layer);
             *out = encode_layer(layer, reach, film_from_world, &mut encoded.pixels);
             out.share = own as f32;
             out.cumulative = cumulative as f32;
         }
         encoded
+    }
+
+    /// Where the layers lie along the first number, and what tables have taken of them.
+    fn extents(&self, foveas: &[Fovea]) -> Vec<Extent> {
+        let sum: f32 = self.layers.iter().map(|(weight, _)| weight).sum();
+        let mut lower = 0.0;
+        let extent = |(at, (weight, layer)): (usize, &(f32, Layer))| {
+            let part = foveas.iter().flat_map(|of_gaze| &of_gaze.parts).find(|part| part.layer == at);
+            let size = f64::from(weight / sum);
+            let tabled = size * part.map_or(0.0, |part| part.share);
+            let reach_end = match layer {
+                Layer::Acuity { .. } => f64::from(self.radius_of_interest(layer)),
+                _ => 1.0,
+            };
+            let taken = part.map_or(0.0, |part| f64::from(part.radius_end));
+            lower += size;
+            Extent { lower: lower - size, size, reach_end, taken, tabled, kept: size - tabled }
+        };
+        self.layers.iter().enumerate().map(extent).collect()
     }
 
     /// Where a layer's part of the radial inverse's range ends: candidates beyond the farthest corner of a clip would all be drawn
@@ -353,6 +376,8 @@ pub(crate) struct Encoded {
     pub fovea: Vec<(u32, u32)>,
     /// Where the last of those intervals ends; 0 without.
     pub fovea_end: u32,
+    /// Of the unit square beyond.
+    pub guide: Option<Guide>,
 }
 
 /// `reach`: of an acuity layer, the part of the radial inverse's range that it draws from.
@@ -484,7 +509,7 @@ mod tests {
         let clip = Clip { view, margin: 0.0, unclipped_share: 0.0 };
         let foveated = Distribution::foveated(Gaze::Scene { direction: Vec3::NEG_Z }, Some(clip), inverse);
         let film = FilmOptions::equirect(256, 128);
-        foveated.encode(FilmFrame { options: &film, world_from_film: Quat::IDENTITY }, true)
+        foveated.encode(FilmFrame { options: &film, world_from_film: Quat::IDENTITY }, true, None)
     }
 
     /// Of the layer only corners beyond the table lie in a view that just holds the rim: most samples are the table's, not all.

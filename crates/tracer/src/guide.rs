@@ -31,12 +31,12 @@ const ELEMENTS_PER_CELL: f64 = 4.0;
 /// Samples of an element at the gaze when noise is first judged.
 const FIRST_SAMPLES: f64 = 4.0;
 
-/// Weights of the unit square's cells, as the kernels read them.
+/// Densities of the unit square's cells.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Guide {
     rows: u32,
-    /// A CDF over the columns, then one over the cells of each column; each begins with 0 and ends with 1.
-    bounds: Vec<f32>,
+    /// Column by column, relative to a mean of 1; all positive.
+    densities: Vec<f32>,
 }
 
 impl Guide {
@@ -53,12 +53,8 @@ impl Guide {
         }
         let mean = sum / cells as f64;
         let floor = f64::from(FLOOR);
-        let mixed = |weight: &f32| floor + (1.0 - floor) * f64::from(*weight) / mean;
-        let columns: Vec<Vec<f64>> =
-            weights.chunks_exact(rows as usize).map(|column| column.iter().map(mixed).collect()).collect();
-        let mut bounds = cdf(columns.iter().map(|column| column.iter().sum()));
-        bounds.extend(columns.iter().flat_map(|column| cdf(column.iter().copied())));
-        Some(Self { rows, bounds })
+        let mixed = |weight: &f32| (floor + (1.0 - floor) * f64::from(*weight) / mean) as f32;
+        Some(Self { rows, densities: weights.iter().map(mixed).collect() })
     }
 
     /// What the noise of a film's cells asks for; `elements` are, column by column, film pixels that the eye does not tell apart.
@@ -86,21 +82,32 @@ impl Guide {
     }
 
     /// Density of each cell relative to that without a guide, column by column.
-    pub fn densities(&self) -> Vec<f32> {
-        let (rows, columns) = (self.rows as usize, (self.rows * GUIDE_COLUMNS_PER_ROW) as usize);
-        let (of_columns, of_cells) = self.bounds.split_at(columns + 1);
-        let widths = of_columns.windows(2).map(|pair| pair[1] - pair[0]);
-        let columns_of_cells = of_cells.chunks_exact(rows + 1);
-        let cells = (rows * columns) as f32;
-        let column = |(width, bounds): (f32, &[f32])| -> Vec<f32> {
-            bounds.windows(2).map(|pair| width * (pair[1] - pair[0]) * cells).collect()
-        };
-        widths.zip(columns_of_cells).flat_map(column).collect()
+    pub fn densities(&self) -> &[f32] {
+        &self.densities
     }
 
-    /// The table as the kernels read it.
-    pub(crate) fn table(&self) -> &[f32] {
-        &self.bounds
+    /// What is asked for at a point of the unit square beyond the floor that every cell keeps; its mean is 1.
+    pub(crate) fn wish(&self, [x, y]: [f64; 2]) -> f64 {
+        let columns = self.rows * GUIDE_COLUMNS_PER_ROW;
+        let cell = |place: f64, count: u32| ((place * f64::from(count)) as usize).min(count as usize - 1);
+        let density = self.densities[cell(x, columns) * self.rows as usize + cell(y, self.rows)];
+        (f64::from(density - FLOOR) / f64::from(1.0 - FLOOR)).max(0.0)
+    }
+
+    /// As many cells of another unit square, with densities in proportion to these, which are positive.
+    pub(crate) fn with_densities(&self, density: impl Fn(usize) -> f64) -> Self {
+        let densities: Vec<f64> = (0..self.densities.len()).map(density).collect();
+        let mean = densities.iter().sum::<f64>() / densities.len() as f64;
+        Self { rows: self.rows, densities: densities.into_iter().map(|density| (density / mean) as f32).collect() }
+    }
+
+    /// As the kernels read it: a CDF over the columns, then one over the cells of each column; each begins with 0 and ends with 1.
+    pub(crate) fn table(&self) -> Vec<f32> {
+        let columns = || self.densities.chunks_exact(self.rows as usize);
+        let densities = |column: &'_ [f32]| column.iter().copied().map(f64::from).collect::<Vec<_>>();
+        let mut bounds = cdf(columns().map(|column| densities(column).iter().sum()));
+        bounds.extend(columns().flat_map(|column| cdf(densities(column).into_iter())));
+        bounds
     }
 }
 
@@ -215,7 +222,8 @@ mod tests {
 
     #[test]
     fn weights_follow_the_deviation_above_their_floor() {
-        let densities = guide(&film(16.0, |x| if x < COLUMNS / 2 { 1.0 } else { 0.5 })).unwrap().densities();
+        let guide = guide(&film(16.0, |x| if x < COLUMNS / 2 { 1.0 } else { 0.5 })).unwrap();
+        let densities = guide.densities();
         // Neyman: 4/3 and 2/3 of the mean, with a quarter that all have; the prior draws them a little closer.
         let (first, last) = (densities[0], densities[densities.len() - 1]);
         assert!((first - 1.25).abs() < 0.03 && (last - 0.75).abs() < 0.03, "{first} {last}");
@@ -226,7 +234,8 @@ mod tests {
     fn what_the_eye_cannot_see_any_more_gets_the_floor() {
         // A hundredth of the threshold in one half; the noise of the other is seen.
         let cells = film(1e4, |x| if x < COLUMNS / 2 { 0.1 } else { 8.0 });
-        let densities = guide(&cells).unwrap().densities();
+        let guide = guide(&cells).unwrap();
+        let densities = guide.densities();
         assert!((densities[0] - FLOOR).abs() < 0.02, "{}", densities[0]);
         // In elements of as many pixels, both halves are done, and what is left goes where most is left.
         let wide = Guide::from_noise(&cells, &[1e4; COLUMNS as usize], ROWS).unwrap();
@@ -237,7 +246,8 @@ mod tests {
     fn every_cell_keeps_the_floor_whatever_is_asked_for() {
         let mut weights = vec![0.0; (COLUMNS * ROWS) as usize];
         weights[37] = 1e30;
-        let densities = Guide::from_weights(&weights, ROWS).unwrap().densities();
+        let single = Guide::from_weights(&weights, ROWS).unwrap();
+        let densities = single.densities();
         assert!(densities.iter().all(|density| *density >= 0.99 * FLOOR), "{densities:?}");
         assert!(densities[37] > 100.0);
         let cells = film(16.0, |x| if x == 5 { 1e6 } else { 1e-6 });
@@ -248,7 +258,8 @@ mod tests {
     fn a_single_bright_sample_moves_little() {
         let mut cells = film(16.0, |_| 0.5);
         cells[100].squares *= 1e6;
-        let densities = guide(&cells).unwrap().densities();
+        let guide = guide(&cells).unwrap();
+        let densities = guide.densities();
         assert!(densities.iter().all(|density| *density <= FLOOR + (1.0 - FLOOR) * LARGEST_DEVIATION));
     }
 

@@ -12,8 +12,8 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::{
-    ALONG_THE_SCREEN, FilmFrame, Gaze, View, at_eye, column_part, direction_of_parts, gaze_frame, place_direction,
-    row_part,
+    ALONG_THE_SCREEN, FilmFrame, Gaze, View, at_eye, column_part, direction_of_parts, film_direction, gaze_frame,
+    place_direction, row_part,
 };
 use crate::film::{FilmMapping, FilmOptions};
 
@@ -62,6 +62,27 @@ impl Table {
     fn push(&mut self, pixel: u32, weight: f64) {
         self.sums.push(self.sums.last().copied().unwrap_or(0.0) + weight);
         self.pixels.push(pixel);
+    }
+
+    fn weights(&self) -> impl Iterator<Item = f64> + '_ {
+        let lower = std::iter::once(0.0).chain(self.sums.iter().copied());
+        self.sums.iter().zip(lower).map(|(upper, lower)| upper - lower)
+    }
+
+    /// Mean over the samples of something that each pixel has.
+    pub fn mean(&self, values: &[f64]) -> f64 {
+        let sum: f64 = self.weights().zip(values).map(|(weight, value)| weight * value).sum();
+        sum / self.sums.last().copied().unwrap_or(1.0)
+    }
+
+    /// Multiplies the pixels' weights.
+    pub fn scale(&mut self, factors: &[f64]) {
+        let mut sum = 0.0;
+        let scaled = self.weights().zip(factors).map(|(weight, factor)| {
+            sum += weight * factor;
+            sum
+        });
+        self.sums = scaled.collect();
     }
 
     /// Lower ends of the pixels' intervals in `[from, from + size)`, fractions of 2^32 and multiples of 2^8, with the pixels.
@@ -160,6 +181,29 @@ impl Fovea {
         let accepted = clip.map_or(1.0, |view| self.accepted(view, radius_scale, inverse));
         let share = within / (within + (1.0 - within) * accepted);
         self.parts.push(Part { layer, share, radius_end: self.radius_end });
+    }
+
+    /// Where the pixels' centres lie: how far up in the radial inverse's range, and the azimuth in turns.
+    pub fn places(&self, inverse: &Inverse, film: FilmFrame<'_>) -> Vec<[f64; 2]> {
+        let gaze = match self.gaze {
+            Gaze::Scene { direction } => direction,
+            Gaze::Eye { on_screen, screen_half_extent, .. } => at_eye(on_screen, screen_half_extent),
+        };
+        let frame = gaze_frame(gaze);
+        let width = film.options.width;
+        let place = |&pixel: &u32| {
+            let d = film.world_from_film * film_direction(film.options, pixel % width, pixel / width);
+            let seen = match self.gaze {
+                Gaze::Scene { .. } => d,
+                Gaze::Eye { screen_half_extent, view, .. } => {
+                    view.project(d).map_or(gaze, |point| at_eye(point, screen_half_extent))
+                }
+            };
+            let about = frame.transpose() * seen;
+            let turns = f64::from(about.y).atan2(f64::from(about.x)) / TAU;
+            [f64::from(range_within(inverse, versine(seen, gaze))), turns.rem_euclid(1.0)]
+        };
+        self.pixels.pixels.par_iter().map(place).collect()
     }
 
     /// Share of a layer's candidates from the rim outwards that lie in a view; at least that of one of those that are tried.
@@ -293,8 +337,6 @@ impl Pixels<'_> {
     /// 1 - cos of the eccentricity of a direction in the film's frame, and steradians at the eye for one in the scene there.
     fn seen(&self, in_film: Vec3) -> Option<(f32, f64)> {
         let d = self.film.world_from_film * in_film;
-        // Without the cancellation of 1 - cos.
-        let versine = |a: Vec3, b: Vec3| 0.5 * (a - b).length_squared();
         match self.gaze {
             Gaze::Scene { direction } => Some((versine(d, direction), 1.0)),
             Gaze::Eye { on_screen, screen_half_extent, view } => {
@@ -308,6 +350,11 @@ impl Pixels<'_> {
             }
         }
     }
+}
+
+/// 1 - cos of the angle between two unit vectors, without the cancellation.
+fn versine(a: Vec3, b: Vec3) -> f32 {
+    0.5 * (a - b).length_squared()
 }
 
 fn eccentricity(versine: f32) -> f64 {

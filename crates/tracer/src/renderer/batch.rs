@@ -35,13 +35,14 @@ impl Renderer {
         (2f32.powi(38 - exponent), 2f32.powi(32 - exponent))
     }
 
+    /// Of a batch of so many samples, with what they are chosen by.
     pub(super) fn write_params(&mut self, samples: u32) -> Result<(), RenderError> {
+        self.prepare_sampling(false);
         self.write_guided_params(samples, self.guide().map_or(0, Guide::rows))
     }
 
     /// The unit square has so many rows of cells; 0 without a guide.
     pub(super) fn write_guided_params(&mut self, samples: u32, guide_rows: u32) -> Result<(), RenderError> {
-        self.prepare_sampling(guide_rows != 0);
         let params = BatchParams { guide_rows, ..self.batch_params(samples)? };
         for (slab, buffer) in self.film.slabs.iter().zip(&self.params) {
             let params =

@@ -30,7 +30,8 @@ pub(super) struct Sampling {
 struct Key {
     film: FilmOptions,
     world_from_film: Quat,
-    has_fovea: bool,
+    /// For cells of the layers alone to be judged.
+    is_judged: bool,
 }
 
 impl Default for Sampling {
@@ -58,27 +59,23 @@ impl Sampling {
 impl Renderer {
     /// Brings to the device what the next batch's samples are chosen by, where it has changed.
     ///
-    /// `is_guided`: points of the unit square are to be those of the layers alone.
-    pub(super) fn prepare_sampling(&mut self, is_guided: bool) {
-        let key = Key {
-            film: self.options.film,
-            world_from_film: self.pose.world_from_film,
-            // A guide moves samples between cells of the unit square, of which the table's are no places on the film.
-            has_fovea: !is_guided && !self.is_adaptive(),
-        };
+    /// `is_judged`: the unit square is to be that of the layers alone.
+    pub(super) fn prepare_sampling(&mut self, is_judged: bool) {
+        let key = Key { film: self.options.film, world_from_film: self.pose.world_from_film, is_judged };
         if self.sampling.key == Some(key) {
             return;
         }
         let frame = FilmFrame { options: &self.options.film, world_from_film: self.pose.world_from_film };
-        let Encoded { layers, layer_count, pixels: mut words, fovea, fovea_end } =
-            self.distribution.encode(frame, key.has_fovea);
+        let guide = self.guide().filter(|_| !is_judged);
+        let Encoded { layers, layer_count, pixels: mut words, fovea, fovea_end, guide } =
+            self.distribution.encode(frame, !is_judged, guide);
         let table = TableWords::new(&fovea, fovea_end);
         let fovea_first = words.len() as u32;
         words.extend_from_slice(table.entries.as_flattened());
         let fovea_cells = words.len() as u32;
         words.extend(table.cells);
         let guide_first = words.len() as u32;
-        words.extend(self.guide().into_iter().flat_map(Guide::table).map(|bound| bound.to_bits()));
+        words.extend(guide.iter().flat_map(Guide::table).map(f32::to_bits));
         self.upload_pixel_list(&words);
         self.sampling = Sampling {
             key: Some(key),

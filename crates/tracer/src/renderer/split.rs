@@ -48,7 +48,7 @@ impl Renderer {
     fn pilot(&self, pose: FilmPose, max_bounces: u32, environment: f32) -> Result<f64, RenderError> {
         let everywhere = Distribution::omnidirectional(self.distribution.inverse().clone());
         let film = FilmFrame { options: &self.options.film, world_from_film: pose.world_from_film };
-        let encoded = everywhere.encode(film, false);
+        let encoded = everywhere.encode(film, false, None);
         let next = self.batch_params(PILOT_SAMPLES)?;
         let params = BatchParams {
             first_index_low: 0,
