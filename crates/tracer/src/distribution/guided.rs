@@ -53,7 +53,8 @@ pub(super) fn guided(
         foveas.iter().zip(&wishes).map(|(fovea, wishes)| tabled(fovea, extents) * fovea.pixels.mean(wishes)).sum();
     let of_rest = wishes_of_rest(guide, extents, kept);
     let mean = wished + kept * of_rest.iter().sum::<f64>() / of_rest.len() as f64;
-    let density = |wish: f64| f64::from(FLOOR) + f64::from(1.0 - FLOOR) * wish / mean;
+    // Cells may be asked for in which no pixel's centre lies: then nothing is asked for.
+    let density = |wish: f64| if mean > 0.0 { f64::from(FLOOR) + f64::from(1.0 - FLOOR) * wish / mean } else { 1.0 };
     let tables = foveas
         .iter_mut()
         .zip(wishes)
@@ -111,4 +112,89 @@ fn wishes_of_rest(guide: &Guide, extents: &[Extent], kept: f64) -> Vec<f64> {
         places[at..at + LOOKUPS].iter().map(|&x| guide.wish([x, row])).sum::<f64>() / LOOKUPS as f64
     };
     (0..rows * columns).map(wish).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use fovea_sampler::{Angle, Geometry, RadialDistribution, Reddy2001};
+    use glam::{Quat, Vec2, Vec3};
+
+    use super::*;
+    use crate::{
+        distribution::{Clip, Distribution, Encoded, Gaze, View},
+        film::FilmOptions,
+    };
+
+    const FILM: FilmOptions = FilmOptions::equirect(512, 256);
+    const ROWS: u32 = 8;
+    const CELLS: usize = (ROWS * ROWS * GUIDE_COLUMNS_PER_ROW) as usize;
+
+    fn encoded(distribution: &Distribution, guide: Option<&Guide>) -> Encoded {
+        distribution.encode(FilmFrame { options: &FILM, world_from_film: Quat::IDENTITY }, true, guide)
+    }
+
+    /// About a gaze in the scene; within a view; and about a gaze at the eye within a view, which has a floor of its own.
+    fn distributions() -> [Distribution; 3] {
+        let acuity = RadialDistribution::new(Reddy2001, Geometry::Sphere, Angle::from_degrees(80.0), 0.002);
+        let inverse = Arc::new(Inverse::default_for(&acuity.expect("valid constants")));
+        let view = View::new(Quat::IDENTITY, 1.4, 0.9);
+        let clip = Some(Clip { view, margin: 0.1, unclipped_share: 0.05 });
+        let scene = Gaze::Scene { direction: Vec3::new(0.1, 0.05, -1.0).normalize() };
+        let eye = Gaze::Eye { on_screen: Vec2::new(0.1, -0.1), screen_half_extent: Vec2::new(0.4, 0.25), view };
+        [(scene, None), (scene, clip), (eye, clip)]
+            .map(|(gaze, clip)| Distribution::foveated(gaze, clip, Arc::clone(&inverse)))
+    }
+
+    /// Of all samples, the share of each pixel of the table.
+    fn shares(encoded: &Encoded) -> Vec<f64> {
+        let ends = encoded.fovea.iter().map(|(lower, _)| *lower).chain([encoded.fovea_end]).collect::<Vec<_>>();
+        ends.windows(2).map(|pair| f64::from(pair[1] - pair[0]) * 2f64.powi(-32)).collect()
+    }
+
+    #[test]
+    fn every_pixel_and_cell_keeps_the_floor_and_shares_stay_whole() {
+        let weights: Vec<f32> = (0..CELLS).map(|cell| ((cell * 7919 % 101) as f32 / 10.0).powi(2)).collect();
+        let guide = Guide::from_weights(&weights, ROWS).expect("weights");
+        for distribution in distributions() {
+            let (plain, guided) = (encoded(&distribution, None), encoded(&distribution, Some(&guide)));
+            assert!(plain.fovea_end > 0 && plain.fovea.len() > 100 && plain.guide.is_none());
+            let layers = guided.layer_count as usize;
+            assert!((guided.layers[layers - 1].cumulative - 1.0).abs() < 1e-6);
+            // Ends are multiples of 2^-24: of slivers at the rim a ratio says nothing.
+            let ratios: Vec<f64> = shares(&guided)
+                .iter()
+                .zip(shares(&plain))
+                .filter(|(_, plain)| *plain > 100.0 * 2f64.powi(-24))
+                .map(|(own, plain)| own / plain)
+                .collect();
+            let least = ratios.iter().copied().fold(f64::INFINITY, f64::min);
+            assert!(least > 0.98 * f64::from(FLOOR) && ratios.iter().any(|ratio| *ratio > 1.5), "{least}");
+            let rest = |encoded: &Encoded| 1.0 - f64::from(encoded.fovea_end) * 2f64.powi(-32);
+            let of_rest = guided.guide.as_ref().expect("a guide of the rest");
+            let least = of_rest.densities().iter().copied().fold(f32::INFINITY, f32::min);
+            let least = f64::from(least) * rest(&guided) / rest(&plain);
+            assert!(least > 0.99 * f64::from(FLOOR) && least < 0.5, "{least}");
+        }
+    }
+
+    #[test]
+    fn an_even_guide_changes_nothing_and_one_that_asks_for_no_pixel_either() {
+        let even = Guide::from_weights(&[1.0; CELLS], ROWS).expect("weights");
+        // All that is asked for lies in a cell of a film that has no pixel there.
+        let mut single = [0.0; CELLS];
+        single[3] = 1.0;
+        let single = Guide::from_weights(&single, ROWS).expect("weights");
+        for distribution in distributions() {
+            let plain = encoded(&distribution, None);
+            let same = encoded(&distribution, Some(&even));
+            assert!(plain.fovea.iter().zip(&same.fovea).all(|(a, b)| a.1 == b.1 && a.0.abs_diff(b.0) <= 512));
+            let film = FilmOptions::equirect(64, 32);
+            let frame = FilmFrame { options: &film, world_from_film: Quat::IDENTITY };
+            let guided = distribution.encode(frame, true, Some(&single));
+            let guide = guided.guide.expect("a guide of the rest");
+            assert!(guide.table().iter().all(|bound| bound.is_finite()) && guided.layers[0].share.is_finite());
+        }
+    }
 }
