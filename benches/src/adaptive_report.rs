@@ -119,7 +119,7 @@ impl Films {
             if until >= half {
                 return Ok(start.elapsed().as_secs_f64());
             }
-            until *= 2;
+            until *= 4;
         }
     }
 }

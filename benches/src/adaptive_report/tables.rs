@@ -56,7 +56,7 @@ const COST: &str = "
 ## Cost
 
 Judging the noise on a film of 2048x1024 (4096 cells of 16 points), median of 9, against tracing the samples after which it is first
-done; from then on it is done when they have doubled, so that its share halves each time.
+done; from then on it is done when there are four times as many, so that its share falls to a quarter each time.
 
 ";
 

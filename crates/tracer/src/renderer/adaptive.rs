@@ -7,6 +7,9 @@ use crate::{
     kernels::{Kernel, layout::CellNoise},
 };
 
+/// Noise is judged again when there are so many times as many samples: each guide begins the sequences of the pixels about the gaze anew.
+const JUDGED_AGAIN: u64 = 4;
+
 /// What the renderer knows about adaptive sampling.
 #[derive(Debug, Default)]
 pub(super) struct Adaptive {
@@ -26,9 +29,9 @@ impl Renderer {
     /// Gives more samples, from now on, to where the film is visibly noisy, or no longer does. The film goes on.
     ///
     /// Noise is judged when the film holds enough samples about the gaze and the distribution has stayed the same for
-    /// [`FIRST_BATCH`] of them, and again whenever those since then have doubled; [`Renderer::trace`] then waits for the device. What is rendered does not depend on the batches. Counts
-    /// that depend on the samples bias the mean, so [`RenderStatistics::steered`](super::RenderStatistics::steered) counts the samples
-    /// whose place was chosen so.
+    /// [`FIRST_BATCH`] of them, and again whenever those since then are four times as many; [`Renderer::trace`] then waits for the
+    /// device. What is rendered does not depend on the batches. Counts that depend on the samples bias the mean, so
+    /// [`RenderStatistics::steered`](super::RenderStatistics::steered) counts the samples whose place was chosen so.
     pub fn set_adaptive(&mut self, is_on: bool) {
         if self.adaptive.is_on != is_on {
             self.adaptive.is_on = is_on;
@@ -105,7 +108,7 @@ impl Renderer {
         let guide = self.measure_guide()?;
         (self.adaptive.guide, self.adaptive.is_own) = (guide, true);
         let done = self.samples - since;
-        self.adaptive.next = Some(since + if done < first { first } else { (2 * done).next_power_of_two() });
+        self.adaptive.next = Some(since + if done < first { first } else { (JUDGED_AGAIN * done).next_power_of_two() });
         self.sampling.forget();
         Ok(())
     }
