@@ -14,7 +14,7 @@ mod guided;
 
 pub(crate) use fovea::TableWords;
 use fovea::{Fovea, range_within};
-use guided::Extent;
+use guided::{Extent, guided, tabled_share};
 
 use crate::{
     film::{FilmMapping, FilmOptions},
@@ -276,7 +276,7 @@ impl Distribution {
     pub(crate) fn encode(&self, film: FilmFrame<'_>, has_fovea: bool, guide: Option<&Guide>) -> Encoded {
         let mut foveas = if has_fovea { self.foveas(film) } else { Vec::new() };
         let extents = self.extents(&foveas);
-        let guided = guide.map(|guide| guided::guided(guide, &mut foveas, &extents, &self.inverse, film));
+        let guided = guide.map(|guide| guided(guide, &mut foveas, &extents, &self.inverse, film));
         let film_from_world = Mat3::from_quat(film.world_from_film.inverse());
         let mut encoded = Encoded {
             layers: bytemuck::Zeroable::zeroed(),
@@ -288,8 +288,7 @@ impl Distribution {
         };
         let mut tabled = 0.0;
         for (at, of_gaze) in foveas.iter().enumerate() {
-            let share: f64 = of_gaze.parts.iter().map(|part| extents[part.layer].tabled).sum();
-            let own = share * guided.as_ref().map_or(1.0, |guided| guided.tables[at]);
+            let own = tabled_share(of_gaze, &extents) * guided.as_ref().map_or(1.0, |guided| guided.tables[at]);
             encoded.fovea.extend(of_gaze.pixels.intervals(tabled, own));
             tabled += own;
         }
@@ -302,7 +301,7 @@ impl Distribution {
         for (((_, layer), extent), out) in self.layers.iter().zip(&extents).zip(&mut encoded.layers) {
             let own = extent.kept * rest;
             cumulative += own;
-            let reach = extent.taken as f32..self.radius_of_interest(layer);
+            let reach = extent.taken as f32..extent.reach_end as f32;
             *out = encode_layer(layer, reach, film_from_world, &mut encoded.pixels);
             out.share = own as f32;
             out.cumulative = cumulative as f32;
@@ -318,10 +317,7 @@ impl Distribution {
             let part = foveas.iter().flat_map(|of_gaze| &of_gaze.parts).find(|part| part.layer == at);
             let size = f64::from(weight / sum);
             let tabled = size * part.map_or(0.0, |part| part.share);
-            let reach_end = match layer {
-                Layer::Acuity { .. } => f64::from(self.radius_of_interest(layer)),
-                _ => 1.0,
-            };
+            let reach_end = f64::from(self.radius_of_interest(layer));
             let taken = part.map_or(0.0, |part| f64::from(part.radius_end));
             lower += size;
             Extent { lower: lower - size, size, reach_end, taken, tabled, kept: size - tabled }
@@ -329,12 +325,12 @@ impl Distribution {
         self.layers.iter().enumerate().map(extent).collect()
     }
 
-    /// Where a layer's part of the radial inverse's range ends: candidates beyond the farthest corner of a clip would all be drawn
-    /// again.
+    /// Where a layer's part of the radial inverse's range ends, 1 of others than acuity layers: candidates beyond the farthest corner of
+    /// a clip would all be drawn again.
     fn radius_of_interest(&self, layer: &Layer) -> f32 {
         /// What rounding may move a corner by, of the range.
         const MARGIN: f32 = 1e-4;
-        let Layer::Acuity { gaze, clip, radius_scale } = layer else { return 0.0 };
+        let Layer::Acuity { gaze, clip, radius_scale } = layer else { return 1.0 };
         let Some(farthest) = clip.as_ref().and_then(|view| gaze.farthest_corner(view)) else { return *radius_scale };
         (range_within(&self.inverse, farthest) + MARGIN).min(*radius_scale)
     }

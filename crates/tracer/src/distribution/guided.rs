@@ -14,7 +14,7 @@ const LOOKUPS: usize = 8;
 pub(super) struct Extent {
     pub lower: f64,
     pub size: f64,
-    /// Of an acuity layer, the part of the radial inverse's range that it draws from; 0..1 of others.
+    /// The part of the radial inverse's range that it draws from, from 0 on; 1 of others than acuity layers.
     pub reach_end: f64,
     /// Of it, what the table has taken.
     pub taken: f64,
@@ -49,8 +49,11 @@ pub(super) fn guided(
     let kept: f64 = extents.iter().map(|extent| extent.kept).sum();
     let wishes: Vec<Vec<f64>> =
         foveas.iter().map(|fovea| wishes_of_pixels(guide, fovea, extents, inverse, film)).collect();
-    let wished: f64 =
-        foveas.iter().zip(&wishes).map(|(fovea, wishes)| tabled(fovea, extents) * fovea.pixels.mean(wishes)).sum();
+    let wished: f64 = foveas
+        .iter()
+        .zip(&wishes)
+        .map(|(fovea, wishes)| tabled_share(fovea, extents) * fovea.pixels.mean(wishes))
+        .sum();
     let of_rest = wishes_of_rest(guide, extents, kept);
     let mean = wished + kept * of_rest.iter().sum::<f64>() / of_rest.len() as f64;
     // Cells may be asked for in which no pixel's centre lies: then nothing is asked for.
@@ -69,7 +72,7 @@ pub(super) fn guided(
 }
 
 /// Share of all samples that a gaze's table has without a guide.
-fn tabled(fovea: &Fovea, extents: &[Extent]) -> f64 {
+pub(super) fn tabled_share(fovea: &Fovea, extents: &[Extent]) -> f64 {
     fovea.parts.iter().map(|part| extents[part.layer].tabled).sum()
 }
 
@@ -81,7 +84,7 @@ fn wishes_of_pixels(
     inverse: &Inverse,
     film: FilmFrame<'_>,
 ) -> Vec<f64> {
-    let all = tabled(fovea, extents);
+    let all = tabled_share(fovea, extents);
     let wish = |[radius, turns]: [f64; 2]| {
         let of_layer = |extent: &Extent| extent.tabled / all * guide.wish([extent.at(radius), turns]);
         fovea.parts.iter().map(|part| of_layer(&extents[part.layer])).sum()
