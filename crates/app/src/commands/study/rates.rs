@@ -14,9 +14,9 @@ use crate::cli::study::StudyArgs;
 use crate::process::cpu_secs;
 
 /// Rounds over the methods.
-const ROUNDS: u32 = 5;
-/// Samples of each in a round, at most; no more than OD's curve has.
-const SAMPLES: u64 = 1 << 14;
+const ROUNDS: u32 = 9;
+/// Samples of each in a round, at most; no more than OD's curve has. The system counts processor time in hundredths of a second.
+const SAMPLES: u64 = 1 << 16;
 /// Samples before the first round: kernels compile at their first use.
 const WARM_UP: u64 = 1 << 12;
 /// The raw file.
