@@ -79,17 +79,27 @@ pub enum Gaze {
 }
 
 impl Gaze {
+    /// Where the eye looks, in the frame in which eccentricity is measured: the world's or the screen's. A unit vector.
+    fn axis(&self) -> Vec3 {
+        match self {
+            Self::Scene { direction } => *direction,
+            Self::Eye { on_screen, screen_half_extent, .. } => at_eye(*on_screen, *screen_half_extent),
+        }
+    }
+
+    /// In that frame, the direction in which the eye sees a direction in the world, both unit vectors; `None` behind the view.
+    fn seen(&self, direction: Vec3) -> Option<Vec3> {
+        match self {
+            Self::Scene { .. } => Some(direction),
+            Self::Eye { screen_half_extent, view, .. } => Some(at_eye(view.project(direction)?, *screen_half_extent)),
+        }
+    }
+
     /// Versine, 1 - cos, of the eccentricity of a view's corner that is farthest from the gaze. `None` where some place inside may
     /// be farther: that takes a corner at more than a right angle.
     fn farthest_corner(&self, clip: &View) -> Option<f32> {
         let corners = [Vec2::new(1.0, 1.0), Vec2::new(1.0, -1.0), Vec2::new(-1.0, 1.0), Vec2::new(-1.0, -1.0)];
-        let cosine = |corner: Vec2| match self {
-            Self::Scene { direction } => Some(direction.dot(clip.direction(corner))),
-            Self::Eye { on_screen, screen_half_extent, view } => {
-                let corner = at_eye(view.project(clip.direction(corner))?, *screen_half_extent);
-                Some(at_eye(*on_screen, *screen_half_extent).dot(corner))
-            }
-        };
+        let cosine = |corner: Vec2| Some(self.axis().dot(self.seen(clip.direction(corner))?));
         let least = corners.into_iter().map(cosine).try_fold(1.0f32, |least, cosine| Some(least.min(cosine?)))?;
         (least > 0.0).then_some(1.0 - least)
     }
@@ -402,13 +412,13 @@ fn encode_layer(layer: &Layer, reach: Range<f32>, film_from_world: Mat3, pixels:
         Layer::Acuity { gaze, clip, .. } => {
             out.kind = codes::LAYER_ACUITY;
             (out.radius_first, out.radius_size) = (reach.start, reach.end - reach.start);
+            let about_gaze = gaze_frame(gaze.axis());
             let world_from_gaze = match gaze {
-                Gaze::Scene { direction } => gaze_frame(*direction),
+                Gaze::Scene { .. } => about_gaze,
                 // Gaze and sample are points on the screen: warp about the eye, then through the view.
-                Gaze::Eye { on_screen, screen_half_extent, view } => {
-                    let screen_from_gaze = gaze_frame(at_eye(*on_screen, *screen_half_extent));
-                    out.off_screen = screen_from_gaze.row(2).extend(ALONG_THE_SCREEN).to_array();
-                    world_from_image_plane(view, *screen_half_extent) * screen_from_gaze
+                Gaze::Eye { screen_half_extent, view, .. } => {
+                    out.off_screen = about_gaze.row(2).extend(ALONG_THE_SCREEN).to_array();
+                    world_from_image_plane(view, *screen_half_extent) * about_gaze
                 }
             };
             out.film_from_layer = layout::columns(film_from_world * world_from_gaze);

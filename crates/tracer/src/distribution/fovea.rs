@@ -12,7 +12,7 @@ use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 
 use super::{
-    ALONG_THE_SCREEN, FilmFrame, Gaze, View, at_eye, column_part, direction_of_parts, film_direction, gaze_frame,
+    ALONG_THE_SCREEN, FilmFrame, Gaze, View, column_part, direction_of_parts, film_direction, gaze_frame,
     place_direction, row_part,
 };
 use crate::film::{FilmMapping, FilmOptions};
@@ -185,23 +185,15 @@ impl Fovea {
 
     /// Where the pixels' centres lie: how far up in the radial inverse's range, and the azimuth in turns.
     pub fn places(&self, inverse: &Inverse, film: FilmFrame<'_>) -> Vec<[f64; 2]> {
-        let gaze = match self.gaze {
-            Gaze::Scene { direction } => direction,
-            Gaze::Eye { on_screen, screen_half_extent, .. } => at_eye(on_screen, screen_half_extent),
-        };
-        let frame = gaze_frame(gaze);
+        let axis = self.gaze.axis();
+        let frame = gaze_frame(axis);
         let width = film.options.width;
         let place = |&pixel: &u32| {
             let d = film.world_from_film * film_direction(film.options, pixel % width, pixel / width);
-            let seen = match self.gaze {
-                Gaze::Scene { .. } => d,
-                Gaze::Eye { screen_half_extent, view, .. } => {
-                    view.project(d).map_or(gaze, |point| at_eye(point, screen_half_extent))
-                }
-            };
+            let seen = self.gaze.seen(d).unwrap_or(axis);
             let about = frame.transpose() * seen;
             let turns = f64::from(about.y).atan2(f64::from(about.x)) / TAU;
-            [f64::from(range_within(inverse, versine(seen, gaze))), turns.rem_euclid(1.0)]
+            [f64::from(range_within(inverse, versine(seen, axis))), turns.rem_euclid(1.0)]
         };
         self.pixels.pixels.par_iter().map(place).collect()
     }
@@ -229,10 +221,10 @@ fn direction(gaze: &Gaze, versine: f32, turns: f32) -> Option<Vec3> {
     let sine = (versine * (2.0 - versine)).max(0.0).sqrt();
     let (sin, cos) = (std::f32::consts::TAU * turns).sin_cos();
     let local = Vec3::new(sine * cos, sine * sin, 1.0 - versine);
+    let d = gaze_frame(gaze.axis()) * local;
     match gaze {
-        Gaze::Scene { direction } => Some(gaze_frame(*direction) * local),
-        Gaze::Eye { on_screen, screen_half_extent, view } => {
-            let d = gaze_frame(at_eye(*on_screen, *screen_half_extent)) * local;
+        Gaze::Scene { .. } => Some(d),
+        Gaze::Eye { screen_half_extent, view, .. } => {
             (d.z < ALONG_THE_SCREEN).then(|| view.direction(d.truncate() / (-d.z * *screen_half_extent)))
         }
     }
@@ -337,18 +329,18 @@ impl Pixels<'_> {
     /// 1 - cos of the eccentricity of a direction in the film's frame, and steradians at the eye for one in the scene there.
     fn seen(&self, in_film: Vec3) -> Option<(f32, f64)> {
         let d = self.film.world_from_film * in_film;
-        match self.gaze {
-            Gaze::Scene { direction } => Some((versine(d, direction), 1.0)),
-            Gaze::Eye { on_screen, screen_half_extent, view } => {
+        let versine = versine(self.gaze.seen(d)?, self.gaze.axis());
+        let eye_per_scene = match self.gaze {
+            Gaze::Scene { .. } => 1.0,
+            Gaze::Eye { screen_half_extent, view, .. } => {
                 let point = view.project(d)?;
-                let [in_view, at_eye] = [view.half_extent, screen_half_extent].map(|half| point * half);
+                let [in_view, on_screen] = [view.half_extent, screen_half_extent].map(|half| point * half);
                 let of_plane = |p: Vec2| f64::from((1.0 + p.length_squared()) * (1.0 + p.length_squared()).sqrt());
                 let areas = screen_half_extent.element_product() / view.half_extent.element_product();
-                let gaze = (on_screen * screen_half_extent).extend(-1.0).normalize();
-                let eye = at_eye.extend(-1.0).normalize();
-                Some((versine(eye, gaze), f64::from(areas) * of_plane(in_view) / of_plane(at_eye)))
+                f64::from(areas) * of_plane(in_view) / of_plane(on_screen)
             }
-        }
+        };
+        Some((versine, eye_per_scene))
     }
 }
 
