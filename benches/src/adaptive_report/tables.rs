@@ -56,7 +56,8 @@ const COST: &str = "
 ## Cost
 
 Judging the noise on a film of 2048x1024 (4096 cells of 16 points), median of 9, against tracing the samples after which it is first
-done; from then on it is done when there are four times as many, so that its share falls to a quarter each time.
+done; from then on it is done when there are four times as many, so that its share falls to a quarter each time. The
+table of the pixels about the gaze, which the host makes anew then, is not in it.
 
 ";
 
