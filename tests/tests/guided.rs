@@ -187,6 +187,29 @@ fn few_samples_are_smoothed_and_many_are_the_film() {
     assert!(ratio(&mut renderer, 1 << 14) > 10.0);
 }
 
+/// Where one sample in fifty has all the light, most places have met none, and their samples agree that it is dark.
+#[test]
+fn rare_light_leaves_few_dark_places() {
+    let _time = device::Stopwatch::start("rare light");
+    let mut renderer = room();
+    let truth = colors(&renderer);
+    expose(&mut renderer, &truth, 0.02, |_| 4);
+    let dark_share = |renderer: &mut Renderer| {
+        let picture = shown(renderer, &settings(true));
+        let dark = picture.iter().zip(&truth).filter(|(shown, truth)| shown.y < 0.5 * truth.y).count();
+        dark as f32 / truth.len() as f32
+    };
+    let dark = dark_share(&mut renderer);
+    plant(&mut renderer, "view::guided_push", ("view.level != 0u && n * around.variance > scatter", "false"));
+    let planted = dark_share(&mut renderer);
+    eprintln!(
+        "less than half of the light: {:.1} % of the pixels; by their own variance {:.1} %",
+        100.0 * dark,
+        100.0 * planted
+    );
+    assert!(dark < 0.15 && planted > 0.2, "{dark}, {planted}");
+}
+
 #[test]
 fn guides_are_of_the_picture_alone() {
     let mut renderer = room();
