@@ -2,8 +2,8 @@
 //!
 //! One looks at the middle of a view of 640x360 pixels before the usual monitor, in FV. At counts of samples that double, the view is
 //! shown as the film has it, with holes filled, guided, and by Intel's Open Image Denoise (PyPI `pyoidn` for PYTHON, with `numpy`),
-//! and compared with a reference in the foveal disc and outside. WORK_DIR keeps references, pictures and each scene's
-//! numbers; scenes and references that are there are not rendered again. Writes `denoise.json` (raw numbers) and `denoise.md` (tables).
+//! and compared with a reference in the foveal disc and outside. WORK_DIR keeps references and pictures; references that are
+//! there are not rendered again. Writes `denoise.json` (raw numbers) and `denoise.md` (tables).
 
 use std::{
     path::{Path, PathBuf},
@@ -63,13 +63,7 @@ fn run(args: &[String]) -> Result<(), AnyError> {
     let gpu = Gpu::headless(&AdapterSelect::Auto)?;
     let mut scenes = Vec::new();
     for file in files {
-        let name = Path::new(file).file_stem().unwrap_or_default().to_string_lossy();
-        let measured = work.join(format!("{name}.json"));
-        if !measured.exists() {
-            let row = Bench::open(&gpu, Path::new(file), work)?.measure(python)?;
-            std::fs::write(&measured, row.to_string())?;
-        }
-        scenes.push(serde_json::from_slice::<Value>(&std::fs::read(&measured)?)?);
+        scenes.push(Bench::open(&gpu, Path::new(file), work)?.measure(python)?);
     }
     let provenance = Provenance::on(&gpu);
     let machine: serde_json::Map<_, _> =
