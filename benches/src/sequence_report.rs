@@ -83,10 +83,7 @@ fn run(args: &[String]) -> Result<(), AnyError> {
             found.push(measured);
         }
     }
-    let provenance = Provenance::on(&gpu);
-    let machine: serde_json::Map<_, _> =
-        provenance.fields().into_iter().map(|(name, value)| (name.into(), value.into())).collect();
-    let raw = json!({ "machine": machine, "parts": found });
+    let raw = json!({ "parts": found });
     std::fs::create_dir_all(out)?;
     std::fs::write(file, format!("{raw:#}\n"))?;
     std::fs::write(Path::new(out).join("sequence.md"), table(&raw))?;
@@ -181,24 +178,34 @@ fn measure(gpu: &Gpu, subject: &Subject, part: &Part) -> Result<Value, AnyError>
             "standard_error": error,
         }));
     }
-    Ok(json!({ "scene": subject.name, "part": part.name, "seeds": part.seeds, "rows": rows }))
+    let provenance: serde_json::Map<_, _> =
+        Provenance::on(gpu).fields().into_iter().map(|(name, value)| (name.into(), value.into())).collect();
+    Ok(json!({
+        "scene": subject.name, "part": part.name, "seeds": part.seeds, "provenance": provenance, "rows": rows,
+    }))
+}
+
+/// Where a part was measured, in a line.
+fn place(provenance: &Value) -> String {
+    let field = |name: &str| provenance[name].as_str().unwrap_or_default().to_owned();
+    format!("{}; {}; commit {}", field("machine"), field("adapter"), field("commit"))
 }
 
 fn table(raw: &Value) -> String {
     let mut text = String::from("# A pixel's sequence against independent points\n\n");
-    if let Some(machine) = raw["machine"].as_object() {
-        for (name, value) in machine {
-            text += &format!("- {name}: {}\n", value.as_str().unwrap_or_default());
-        }
-    }
-    text += "- 8 bounces; made by `cargo run -p fovea-benches --bin sequence-report -- docs/reports all SCENE...`; raw numbers in \
-             sequence.json\n";
+    let parts = || raw["parts"].as_array().into_iter().flatten();
+    text += "8 bounces; made by `cargo run --release -p fovea-benches --bin sequence-report -- docs/reports PART|all SCENE...`; raw \
+             numbers in sequence.json.\n";
     for part in &PARTS {
         let [width, height] = [part.film.width, part.film.height];
-        text += &format!("\n## {}\n\nFilm {width}x{height}, {} seeds of each sequence.\n\n", part.title, part.seeds);
+        text += &format!("\n## {}\n\nFilm {width}x{height}, {} seeds of each sequence.\n", part.title, part.seeds);
+        let of_part = || parts().filter(|found| found["part"] == part.name);
+        let mut places: Vec<String> = of_part().map(|found| place(&found["provenance"])).collect();
+        places.dedup();
+        text += &format!("{}.\n\n", places.join("; "));
         text += "| scene | samples a pixel | relative variance, independent | sequence | sequence / independent |\n";
         text += "|---|---|---|---|---|\n";
-        for found in raw["parts"].as_array().into_iter().flatten().filter(|found| found["part"] == part.name) {
+        for found in of_part() {
             for row in found["rows"].as_array().into_iter().flatten() {
                 let number = |key: &str| row[key].as_f64().unwrap_or(f64::NAN);
                 text += &format!(

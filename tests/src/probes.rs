@@ -223,6 +223,16 @@ impl Model {
         let places = self.probes.iter().flat_map(|p| [Some(p.at), p.expect.other()].map(|place| (place, p.radius_px)));
         let lists: Vec<Vec<u32>> =
             places.map(|(place, radius)| place.map_or(Vec::new(), |at| self.pixels(scene, at, radius))).collect();
+        // What is not in the picture agrees with everything.
+        let unseen =
+            self.probes.iter().zip(lists.as_chunks().0).filter(|(probe, [value, other])| {
+                value.is_empty() || other.is_empty() && probe.expect.other().is_some()
+            });
+        let unseen: Vec<String> =
+            unseen.map(|(probe, _)| format!("{}: {}: a place is outside of the film", self.file, probe.why)).collect();
+        if !unseen.is_empty() {
+            return Ok(unseen);
+        }
         let mut pixels: Vec<u32> = lists.concat();
         pixels.sort_unstable();
         pixels.dedup();

@@ -255,7 +255,7 @@ const INTRODUCTION: &str = "# White furnace
 
 Albedo of white materials: the mean weight of 131,072 BSDF samples (the largest of the three channels), by the cosine between
 the outgoing direction and the normal. Written by `FOVEA_WRITE_REPORTS=1 cargo test -p fovea-tests --test furnace`; the test
-asserts that nothing is above 1 + 3 standard errors, and that all but the anisotropic and iridescent lobes are within 1 % of 1.
+asserts that nothing is above 1 + 3 standard errors, and that all but the anisotropic and iridescent lobes are within 1 % + 3 standard errors of 1.
 
 Lobes that compensate for multiple scattering among microfacets: reflection off metals and dielectrics, thin transmission, rough
 glass from both sides, clearcoat. Sheen and the layers below every lobe are scaled by directional albedos. The albedo tables are

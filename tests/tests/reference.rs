@@ -1,7 +1,6 @@
 //! Against panoramas by Blender Cycles. On scenes whose materials are all Lambertian: image means within 1 %, means of 16x16
 //! blocks within 3 % + 2 standard errors for 95 % of the blocks. On the scenes in full, where the first hit is not transmissive,
-//! clearcoated or metal: means of blocks within 5 % + 2 standard errors for 95 % of the blocks, where that is reached; where it
-//! is not yet, the test holds what is.
+//! clearcoated or metal: means of blocks within 5 % + 2 standard errors for 95 % of the blocks, and their mean as each test states.
 //!
 //! On the Lambertian scenes the film's pixels are the reference's blocks: a mean over a block's area is what a pixel of a coarser film is. By default
 //! few samples are traced and the standard errors are accordingly large, but bounded: each test states the largest that the
@@ -102,9 +101,9 @@ fn classroom_lambert_is_as_by_cycles() {
     compare("classroom_lambert", 0.0, 16, 0.05);
 }
 
-/// `default_samples` per pixel; `largest_median_error` is relative and of both images together; `least_share` of the blocks must
-/// agree.
-fn compare_unmasked(name: &str, default_samples: u64, largest_median_error: f64, least_share: f64) {
+/// `default_samples` per pixel; `largest_median_error` is relative and of both images together; `mean` is of what lies outside the
+/// mask, ours over theirs.
+fn compare_unmasked(name: &str, default_samples: u64, largest_median_error: f64, mean: f64) {
     let scene_file = device::external_file("reference", "FOVEA_SCENES", &format!("paper/{name}.glb"));
     let image_file = device::external_file("reference", "FOVEA_REFERENCE", &format!("cycles/{name}.exr"));
     let (Some(scene_file), Some(image_file)) = (scene_file, image_file) else { return };
@@ -140,20 +139,22 @@ fn compare_unmasked(name: &str, default_samples: u64, largest_median_error: f64,
         typical * 100.0
     );
     assert!(typical <= largest_median_error, "too few samples for the claim");
-    assert!(share(2.0) >= least_share, "only {} of the blocks are close", share(2.0));
+    assert!((ratio - mean).abs() <= 0.01, "mean ratio {ratio}");
+    assert!(share(2.0) >= 0.95, "only {} of the blocks are close", share(2.0));
 }
 
+/// Its windows, inside the mask, are thin here and solid there: the nave that they light is 1.35 % darker (docs/reports/cycles.md).
 #[test]
 fn sibenik_is_as_by_cycles_outside_the_mask() {
-    compare_unmasked("sibenik", 8, 0.03, 0.95);
+    compare_unmasked("sibenik", 8, 0.03, 0.9865);
 }
 
 #[test]
 fn sponza_is_as_by_cycles_outside_the_mask() {
-    compare_unmasked("sponza", 8, 0.03, 0.95);
+    compare_unmasked("sponza", 8, 0.03, 1.0);
 }
 
 #[test]
 fn classroom_is_as_by_cycles_outside_the_mask() {
-    compare_unmasked("classroom", 16, 0.06, 0.95);
+    compare_unmasked("classroom", 16, 0.06, 1.0);
 }

@@ -28,7 +28,7 @@ fn rows(raw: &Value) -> impl Iterator<Item = (&str, String, &Value, &Value)> {
 }
 
 const INTRODUCTION: &str = "- FV, film 512x256, 8 bounces, Sobol, the gaze at the film's centre
-- made by `cargo run -p fovea-benches --bin adaptive-report -- docs/reports SCENE...`; raw numbers in adaptive.json
+- made by `cargo run --release -p fovea-benches --bin adaptive-report -- docs/reports SCENE...`; raw numbers in adaptive.json
 
 Each way has the same number of samples in all. *One buffer*: the film's own noise steers; this is what `--adaptive` does. *Two buffers*:
 half of the samples steer, only the other half is shown.

@@ -23,7 +23,7 @@ pub fn page(raw: &Value) -> String {
          filled\n\
          - seconds are those of tracing; first hits, once for a view, and the presentation come on top and stand below each table\n\
          - load when it ended: {}; counts of samples and FLIP do not depend on it, seconds do\n\
-         - made by `cargo run -p fovea-benches --bin denoise-report -- docs/reports WORK PYTHON SCENE...`; raw numbers in \
+         - made by `cargo run --release -p fovea-benches --bin denoise-report -- docs/reports WORK PYTHON SCENE...`; raw numbers in \
          denoise.json\n\n",
         raw["view"][0],
         raw["view"][1],

@@ -129,7 +129,7 @@ fn environment_images_load() {
 #[test]
 fn openexr_images_load() {
     let Some(folder) = std::env::var_os("FOVEA_REFERENCE").map(PathBuf::from) else {
-        return eprintln!("openexr_images_load DID NOT RUN: FOVEA_REFERENCE is not set");
+        return eprintln!("SKIP openexr_images_load: FOVEA_REFERENCE is not set");
     };
     let loaded = tracer::environment::load(&folder.join(Path::new("cycles/sibenik.exr"))).unwrap();
     assert!(loaded.image.width == 2 * loaded.image.height, "{:?}", loaded.image);
