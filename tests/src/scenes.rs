@@ -24,9 +24,13 @@ pub fn emitter(radiance: Vec3) -> Material {
 
 /// An environment image of one radiance everywhere: unlike a constant environment it is sampled as a light.
 pub fn even_image(radiance: f32) -> Environment {
-    let pixels = vec![[radiance; 3]; 16 * 8];
+    image(16, 8, vec![[radiance; 3]; 16 * 8])
+}
+
+/// An environment image turned by 20 degrees.
+pub fn image(width: u32, height: u32, pixels: Vec<[f32; 3]>) -> Environment {
     let hash = ContentHash::of(&[bytemuck::cast_slice(&pixels)]);
-    let image = Arc::new(EnvironmentImage { width: 16, height: 8, pixels, hash });
+    let image = Arc::new(EnvironmentImage { width, height, pixels, hash });
     Environment::Image { image, rotation_deg: 20.0, intensity: 1.0 }
 }
 

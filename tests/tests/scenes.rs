@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 
 use fovea_tests::{
     device, pencil,
-    scenes::{Builder, emitter, even_image, lambert},
+    scenes::{Builder, emitter, even_image, image, lambert},
 };
 use glam::{Affine3A, DVec3, Quat, Vec3};
 use tracer::{
@@ -163,6 +163,48 @@ fn a_sphere_in_a_constant_environment_by_each_way_of_sampling() {
     for (what, target) in [("front", Vec3::new(0.1, 0.05, 0.0)), ("rim", Vec3::new(0.0, 0.55, 0.76))] {
         let ray = [Vec3::new(5.0, 0.3, 0.2), target];
         assert_techniques_agree(&gpu, &format!("sphere, {what}"), &scene, ray, 1, 0.6);
+    }
+}
+
+/// As `even_image`, with a sun of 6 x 6 texels that has half of the power: as many cells to choose from as a random number has
+/// few bits left for the choice.
+#[test]
+fn a_small_sun_in_a_large_environment_image() {
+    const WIDTH: u32 = 1024;
+    const HEIGHT: u32 = 512;
+    let gpu = device::gpu();
+    let mut builder = Builder::new(Vec3::ZERO);
+    floor(&mut builder, 0.5);
+    let mut scene = builder.build();
+    let radiance = |x: u32, y: u32| {
+        let is_sun = (300..306).contains(&x) && (150..156).contains(&y);
+        let sky = if y < HEIGHT / 2 { 0.3 + 0.1 * (x % 7) as f32 } else { 0.1 };
+        if is_sun { 5000.0 } else { sky }
+    };
+    let texels = (0..HEIGHT).flat_map(|y| (0..WIDTH).map(move |x| [radiance(x, y); 3])).collect();
+    scene.environment = image(WIDTH, HEIGHT, texels);
+    // Irradiance by quadrature of what the kernels interpolate, a texel in 4 x 4.
+    let texel = |x: i64, y: i64| {
+        f64::from(radiance(x.rem_euclid(i64::from(WIDTH)) as u32, y.clamp(0, i64::from(HEIGHT) - 1) as u32))
+    };
+    let mut irradiance = 0.0;
+    for row in 0..2 * HEIGHT {
+        let v = (f64::from(row) + 0.5) / 4.0 - 0.5;
+        let latitude = PI * (0.5 - (v + 0.5) / f64::from(HEIGHT));
+        let mut sum = 0.0;
+        for column in 0..4 * WIDTH {
+            let u = (f64::from(column) + 0.5) / 4.0 - 0.5;
+            let (x, y, fu, fv) = (u.floor() as i64, v.floor() as i64, u - u.floor(), v - v.floor());
+            let along = |y: i64| texel(x, y) * (1.0 - fu) + texel(x + 1, y) * fu;
+            sum += along(y) * (1.0 - fv) + along(y + 1) * fv;
+        }
+        let solid_angle = 2.0 * PI * PI / (16.0 * f64::from(WIDTH) * f64::from(HEIGHT)) * latitude.cos();
+        irradiance += sum * latitude.sin() * solid_angle;
+    }
+    let ray = [Vec3::new(1.0, 2.0, 0.5), Vec3::ZERO];
+    for technique in [SamplingTechnique::Lights, SamplingTechnique::Both] {
+        let value = measure_by(&gpu, &scene, ray, 1, (technique, COMPARED_SAMPLES));
+        assert_is(&format!("floor under a small sun, {technique:?}"), value, 0.5 * irradiance / PI);
     }
 }
 
