@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use fovea_app::readback;
 use fovea_tests::{
     device,
     plant::exchanged,
@@ -17,6 +18,7 @@ use tracer::{
     kernels::Kernel,
     renderer::{Query, RayKind, Renderer, RendererOptions},
     scene::{AlphaMode, Material, Scene, TexelEncoding},
+    view::{DebugView, ToneMap, ViewProjection, ViewSettings},
 };
 
 const FILM: FilmOptions = FilmOptions::equirect(64, 32);
@@ -155,6 +157,38 @@ fn a_film_that_memory_cannot_hold_is_refused_with_the_figures() {
     let error =
         Renderer::new(&gpu, &options, Distribution::omnidirectional(device::inverse())).unwrap_err().to_string();
     assert!(error.contains(&film.bytes().to_string()) && error.contains("bytes are free"), "{error}");
+}
+
+/// A binding holds the finest level of the largest view; the others lie beside it.
+#[test]
+fn a_view_as_large_as_a_binding_is_shown_and_larger_ones_are_refused() {
+    let gpu = device::gpu();
+    let mut renderer = device::painted(&gpu, FILM, |_, _| Some(Vec3::splat(0.25)));
+    let height = (gpu.largest_binding() / 16 / 4096).min(2048) as u32;
+    let view = |size, debug_view| ViewSettings {
+        projection: ViewProjection::Film,
+        size,
+        exposure_ev: 0.0,
+        tone_map: ToneMap::Linear,
+        debug_view,
+        fill: true,
+        denoise: true,
+        ring: None,
+    };
+    let texels = readback::draw(&mut renderer, &view([4096, height], DebugView::Beauty)).unwrap();
+    let grey = texels[0][0];
+    assert!(grey.abs_diff(137) <= 1, "0.25 is 137 in sRGB, not {grey}");
+    assert!(texels.iter().all(|texel| texel[..3] == [grey; 3]));
+    let limit = gpu.largest_binding();
+    let refused = |renderer: &mut Renderer, size, debug_view| {
+        let error = readback::draw(renderer, &view(size, debug_view)).unwrap_err().to_string();
+        assert!(error.contains("pixels binds") && error.contains(&limit.to_string()), "{error}");
+    };
+    // Where the limit is that of a software adapter; graphics cards bind whatever a texture's sides allow.
+    if limit <= 1 << 27 {
+        refused(&mut renderer, [4096, height + 1], DebugView::Beauty);
+        refused(&mut renderer, [4096, height], DebugView::Depth);
+    }
 }
 
 /// A square of small spheres seen from above: each ray meets the instance that it aims at.

@@ -51,25 +51,26 @@ pub fn write_texture(queue: &wgpu::Queue, texture: &wgpu::Texture, texels: &[[u8
     );
 }
 
-/// Finds out whether the adapter can hold a picture of this size.
+/// Finds out whether the adapter can draw a picture.
 ///
 /// # Errors
 /// When it cannot.
-pub fn check_size(gpu: &Gpu, [width, height]: [u32; 2]) -> anyhow::Result<()> {
+pub fn check(gpu: &Gpu, settings: &ViewSettings) -> anyhow::Result<()> {
+    let [width, height] = settings.size;
     let limit = gpu.device.limits().max_texture_dimension_2d;
     if width == 0 || height == 0 || width.max(height) > limit {
         bail!("a picture of {width}x{height} pixels is beyond adapter {}'s limit of {limit} a side", gpu.info().name);
     }
-    Ok(())
+    Ok(settings.check(gpu)?)
 }
 
 /// Draws a view of the film and reads it back, row by row from the top. Finds the first hits that it shows.
 ///
 /// # Errors
-/// When the picture is larger than the adapter's textures, a kernel does not compile, or the device is lost.
+/// When the picture is larger than the adapter's textures or bindings, a kernel does not compile, or the device is lost.
 pub fn draw(renderer: &mut Renderer, settings: &ViewSettings) -> anyhow::Result<Vec<[u8; 4]>> {
     let gpu = renderer.gpu().clone();
-    check_size(&gpu, settings.size)?;
+    check(&gpu, settings)?;
     while renderer.wants_first_hits(settings) && !renderer.trace_first_hits(settings, FIRST_HITS_AT_ONCE)? {}
     let texture = picture_texture(&gpu, settings.size);
     let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("picture") });

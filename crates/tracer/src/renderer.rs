@@ -78,6 +78,20 @@ pub enum RenderError {
         /// Bytes of memory that are free, where that is known.
         free: Option<u64>,
     },
+    /// A view has more pixels than the device can bind at once.
+    #[error("a view of {width}x{height} pixels binds {bytes} bytes, and adapter {adapter} at most {limit}")]
+    ViewTooLarge {
+        /// Pixels.
+        width: u32,
+        /// Pixels.
+        height: u32,
+        /// Of one binding.
+        bytes: u64,
+        /// What the adapter allows.
+        limit: u64,
+        /// Its name.
+        adapter: String,
+    },
     /// Tracing was asked for before a scene was set.
     #[error("no scene to trace")]
     NoScene,
@@ -449,7 +463,7 @@ impl Renderer {
     /// Reconstructs the view from the film and presents it to a target of the view's size.
     ///
     /// # Errors
-    /// When a kernel does not compile for the target's format.
+    /// When the view has more pixels than fit a binding, or a kernel does not compile for the target's format.
     pub fn present(
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
@@ -463,7 +477,7 @@ impl Renderer {
     /// As [`Renderer::present`], to a part of a target where it says so.
     ///
     /// # Errors
-    /// When a kernel does not compile for the target's format.
+    /// When the view has more pixels than fit a binding, or a kernel does not compile for the target's format.
     pub fn present_to(
         &mut self,
         encoder: &mut wgpu::CommandEncoder,

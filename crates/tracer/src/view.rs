@@ -11,7 +11,7 @@ use crate::{
     gpu::Gpu,
     kernels::{
         Kernel, KernelKey, TILE_SIZE, WORKGROUP_SIZE,
-        layout::{self, ViewParams, codes},
+        layout::{self, FirstHit, ViewParams, codes},
         pipelines::{Pipeline, PipelineCache},
     },
     renderer::RenderError,
@@ -76,11 +76,25 @@ pub struct ViewSettings {
 }
 
 impl ViewSettings {
+    /// Finds out whether an adapter can show this.
+    ///
+    /// # Errors
+    /// When the view has more pixels than fit a binding.
+    pub fn check(&self, gpu: &Gpu) -> Result<(), RenderError> {
+        let bytes = if self.debug_view.shows_first_hits() { size_of::<FirstHit>() as u64 } else { TEXEL_BYTES };
+        check_size(gpu, self.size, bytes)
+    }
+
     /// Whether first hits are guides of this view, as soon as they are all known.
     pub const fn uses_guides(&self) -> bool {
         self.denoise && self.fill && matches!(self.debug_view, DebugView::Beauty)
     }
 }
+
+/// Bytes of a texel of the pyramid.
+const TEXEL_BYTES: u64 = 16;
+/// Texels that a level's offset is a multiple of, since no adapter asks for more than 256 bytes.
+const LEVEL_ALIGNMENT: u32 = 16;
 
 /// Samples at which a pixel's own mean weighs as much as its neighbourhood's, unless told otherwise.
 pub(crate) const CONFIDENCE_SAMPLES: f32 = 1.0;
@@ -134,7 +148,19 @@ pub(crate) struct ViewRenderer {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Level {
     size: [u32; 2],
+    /// Texels before it.
     offset: u32,
+}
+
+impl Level {
+    /// Its texels.
+    fn of(self, pyramid: &wgpu::Buffer) -> wgpu::BindingResource<'_> {
+        wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+            buffer: pyramid,
+            offset: u64::from(self.offset) * TEXEL_BYTES,
+            size: wgpu::BufferSize::new(pixels(self.size) * TEXEL_BYTES),
+        })
+    }
 }
 
 impl ViewRenderer {
@@ -157,7 +183,7 @@ impl ViewRenderer {
     /// Keeps the finished picture, to be shown reprojected until the new film covers it.
     pub fn keep_as_stale(&mut self, gpu: &Gpu) {
         let (Some(pyramid), Some(ViewProjection::Perspective(view))) = (&self.pyramid, self.last) else { return };
-        let size = u64::from(self.size[0]) * u64::from(self.size[1]) * 16;
+        let size = pixels(self.size) * TEXEL_BYTES;
         let copy = gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("stale view"),
             size,
@@ -180,20 +206,21 @@ impl ViewRenderer {
     /// The view that was presented last, row by row: radiance, and the weight that it was found with.
     pub fn finished(&self, gpu: &Gpu) -> Result<([u32; 2], Vec<[f32; 4]>), ReadError> {
         let Some(pyramid) = &self.pyramid else { return Ok(([0; 2], Vec::new())) };
-        let bytes = u64::from(self.size[0]) * u64::from(self.size[1]) * 16;
+        let bytes = pixels(self.size) * TEXEL_BYTES;
         Ok((self.size, read_ranges(gpu, &[(pyramid, 0, bytes)])?))
     }
 
-    fn resize(&mut self, size: [u32; 2]) {
+    fn resize(&mut self, size: [u32; 2]) -> Result<(), RenderError> {
         if self.size == size && self.pyramid.is_some() {
-            return;
+            return Ok(());
         }
+        check_size(&self.gpu, size, TEXEL_BYTES)?;
         self.size = size;
         self.levels.clear();
         let (mut level, mut offset) = (size, 0);
         loop {
             self.levels.push(Level { size: level, offset });
-            offset += level[0] * level[1];
+            offset = (offset + level[0] * level[1]).next_multiple_of(LEVEL_ALIGNMENT);
             // The last level is one pixel: as long as there is one sample, no part of the view is without a value.
             if level[0].max(level[1]) <= 1 {
                 break;
@@ -202,10 +229,11 @@ impl ViewRenderer {
         }
         self.pyramid = Some(self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("view pyramid"),
-            size: u64::from(offset) * 16,
+            size: u64::from(offset) * TEXEL_BYTES,
             usage: BufferUsages::STORAGE | BufferUsages::COPY_SRC,
             mapped_at_creation: false,
         }));
+        Ok(())
     }
 
     /// What the ends of a debug view's colours stand for; `None` where it has no such scale or nothing is known yet.
@@ -229,7 +257,7 @@ impl ViewRenderer {
         settings: &ViewSettings,
         target: &ViewTarget<'_>,
     ) -> Result<(), RenderError> {
-        self.resize(settings.size);
+        self.resize(settings.size)?;
         let gpu = self.gpu.clone();
         let device = &gpu.device;
         let film = source.film;
@@ -278,7 +306,7 @@ impl ViewRenderer {
                 let resources = [
                     (0, params.as_entire_binding()),
                     (1, slab.buffer.as_entire_binding()),
-                    (2, pyramid.as_entire_binding()),
+                    (2, self.levels[0].of(pyramid)),
                     (4, errors.as_entire_binding()),
                     (7, moments.as_entire_binding()),
                 ];
@@ -287,11 +315,20 @@ impl ViewRenderer {
                     kernel.dispatch(&mut pass, &[&group], tiles(settings.size));
                 }
             }
-            let of_level = |kernel: &Pipeline, params: ViewParams| {
-                let params = upload(params);
+            // Of the fine level alone where there is no coarser one.
+            let of_level = |kernel: &Pipeline, level: usize, fine: Level, coarse: Level| {
+                let params = upload(ViewParams {
+                    level: level as u32,
+                    size: fine.size,
+                    level_offset: fine.offset,
+                    coarse_offset: coarse.offset,
+                    coarse_size: coarse.size,
+                    ..base
+                });
                 let resources = [
                     (0, params.as_entire_binding()),
-                    (2, pyramid.as_entire_binding()),
+                    (2, fine.of(pyramid)),
+                    (9, coarse.of(pyramid)),
                     (3, stale.as_entire_binding()),
                     (5, hits.as_entire_binding()),
                     (6, guides.as_entire_binding()),
@@ -301,34 +338,28 @@ impl ViewRenderer {
                 kernel.bind(device, 0, &resources)
             };
             if let Some(demodulate) = &demodulate {
-                demodulate.dispatch(&mut pass, &[&of_level(demodulate, base)], tiles(settings.size));
+                let finest = self.levels[0];
+                demodulate.dispatch(&mut pass, &[&of_level(demodulate, 0, finest, finest)], tiles(settings.size));
             }
             let pairs: Vec<_> = self.levels.windows(2).map(|w| (w[0], w[1])).enumerate().collect();
-            let level_params = |level: usize, fine: Level, coarse: Level| ViewParams {
-                level: level as u32,
-                size: fine.size,
-                level_offset: fine.offset,
-                coarse_offset: coarse.offset,
-                coarse_size: coarse.size,
-                ..base
-            };
             if let Some([guide, tie_pull, tie_push]) = &tie {
-                guide.dispatch(&mut pass, &[&of_level(guide, base)], tiles(settings.size));
+                let finest = self.levels[0];
+                guide.dispatch(&mut pass, &[&of_level(guide, 0, finest, finest)], tiles(settings.size));
                 for &(level, (fine, coarse)) in &pairs {
-                    let group = of_level(tie_pull, level_params(level, fine, coarse));
+                    let group = of_level(tie_pull, level, fine, coarse);
                     tie_pull.dispatch(&mut pass, &[&group], tiles(coarse.size));
                 }
                 for &(level, (fine, coarse)) in &pairs {
-                    let group = of_level(tie_push, level_params(level, fine, coarse));
+                    let group = of_level(tie_push, level, fine, coarse);
                     tie_push.dispatch(&mut pass, &[&group], tiles(fine.size));
                 }
             }
             for &(level, (fine, coarse)) in &pairs {
-                let group = of_level(&pull, level_params(level, fine, coarse));
+                let group = of_level(&pull, level, fine, coarse);
                 pull.dispatch(&mut pass, &[&group], tiles(coarse.size));
             }
             for &(level, (fine, coarse)) in pairs.iter().rev() {
-                let group = of_level(&push, level_params(level, fine, coarse));
+                let group = of_level(&push, level, fine, coarse);
                 push.dispatch(&mut pass, &[&group], tiles(fine.size));
             }
         }
@@ -337,7 +368,7 @@ impl ViewRenderer {
             0,
             &[
                 (0, upload(base).as_entire_binding()),
-                (1, finished_binding(pyramid, settings.size)),
+                (1, self.levels[0].of(pyramid)),
                 (4, errors.as_entire_binding()),
                 (5, hits.as_entire_binding()),
             ],
@@ -349,7 +380,7 @@ impl ViewRenderer {
 
     /// Buffers that a debug view needs are there, those that it does not need are gone.
     fn make_room(&mut self, settings: &ViewSettings, shows_errors: bool) {
-        let bytes = u64::from(settings.size[0]) * u64::from(settings.size[1]) * 16;
+        let bytes = pixels(settings.size) * TEXEL_BYTES;
         if !shows_errors {
             self.errors = None;
         } else if self.errors.as_ref().is_none_or(|errors| errors.size() != bytes) {
@@ -363,7 +394,7 @@ impl ViewRenderer {
         if !settings.debug_view.shows_first_hits() && !settings.uses_guides() {
             self.hits = None;
         }
-        let texels = self.levels.iter().map(|level| u64::from(level.size[0]) * u64::from(level.size[1])).sum();
+        let texels = self.levels.last().map_or(0, |level| u64::from(level.offset) + pixels(level.size));
         let known = self.hits.as_ref().filter(|hits| hits.rows == settings.size[1]).map(|hits| hits.of);
         match known.filter(|_| settings.uses_guides() && self.levels.len() > 1) {
             None => self.guides = None,
@@ -391,11 +422,7 @@ impl ViewRenderer {
         let group = kernel.bind(
             device,
             0,
-            &[
-                (0, params.as_entire_binding()),
-                (1, finished_binding(pyramid, self.size)),
-                (2, counts.as_entire_binding()),
-            ],
+            &[(0, params.as_entire_binding()), (1, self.levels[0].of(pyramid)), (2, counts.as_entire_binding())],
         );
         let pixels = self.size[0] * self.size[1];
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("histogram") });
@@ -457,12 +484,16 @@ impl ViewRenderer {
     }
 }
 
-/// The finished level 0 of a pyramid.
-fn finished_binding(pyramid: &wgpu::Buffer, size: [u32; 2]) -> wgpu::BindingResource<'_> {
-    let bytes = u64::from(size[0]) * u64::from(size[1]) * 16;
-    wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-        buffer: pyramid,
-        offset: 0,
-        size: wgpu::BufferSize::new(bytes),
-    })
+fn pixels([width, height]: [u32; 2]) -> u64 {
+    u64::from(width) * u64::from(height)
+}
+
+/// Finds out whether the adapter can bind what a view has of so many bytes for each pixel.
+pub(crate) fn check_size(gpu: &Gpu, size: [u32; 2], bytes: u64) -> Result<(), RenderError> {
+    let bytes = pixels(size) * bytes;
+    let limit = gpu.largest_binding();
+    if bytes <= limit {
+        return Ok(());
+    }
+    Err(RenderError::ViewTooLarge { width: size[0], height: size[1], bytes, limit, adapter: gpu.info().name.clone() })
 }

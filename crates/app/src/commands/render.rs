@@ -62,7 +62,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     };
     let film = options.film;
     if format == ImageFormat::Png {
-        readback::check_size(&gpu, [film.width, film.height])?;
+        readback::check(&gpu, &whole_film(args, &film))?;
     }
     let aim = aim(args, &film, pose.world_from_film)?;
     let steps = match &args.gaze_trace {

@@ -9,7 +9,7 @@ use crate::{
         Kernel, TILE_SIZE,
         layout::{self, FirstHit, FirstHitParams, codes},
     },
-    view::{DebugScale, DebugView, FilmSource, FirstHits, Histogram, HitsOf, ViewProjection, ViewSettings},
+    view::{DebugScale, DebugView, FilmSource, FirstHits, Histogram, HitsOf, ViewProjection, ViewSettings, check_size},
 };
 
 impl Renderer {
@@ -18,10 +18,11 @@ impl Renderer {
     /// rows are done. What was found stays until a view that does not show it is presented.
     ///
     /// # Errors
-    /// When there is no scene, the kernel does not compile, or the device is lost.
+    /// When there is no scene, the view has more pixels than fit a binding, the kernel does not compile, or the device is lost.
     pub fn trace_first_hits(&mut self, settings: &ViewSettings, most_pixels: u32) -> Result<bool, RenderError> {
         let of = self.hits_of(settings);
         let gpu = self.gpu.clone();
+        check_size(&gpu, of.size, size_of::<FirstHit>() as u64)?;
         let key = self.key(Kernel::FirstHit);
         let kernel = self.pipelines.compute(&gpu.device, &key)?;
         let scene = self.scene.as_ref().ok_or(RenderError::NoScene)?;
@@ -76,8 +77,7 @@ impl Renderer {
 
     /// Whether a view shows first hits, or uses them as guides and the adapter can bind as many.
     pub fn wants_first_hits(&self, settings: &ViewSettings) -> bool {
-        let pixels = u64::from(settings.size[0]) * u64::from(settings.size[1]);
-        let fits = pixels * size_of::<FirstHit>() as u64 <= self.gpu.largest_binding();
+        let fits = check_size(&self.gpu, settings.size, size_of::<FirstHit>() as u64).is_ok();
         settings.debug_view.shows_first_hits() || settings.uses_guides() && fits
     }
 
