@@ -80,6 +80,8 @@ put("zmtp", "seed-error", GREETING + bytes([4, 10]) + b"\x05ERROR\x03no!")
 put("trace", "seed-screen", "# gaze-trace v1; source=gazepoint; space=screen01; screen_mm=531x299; distance_mm=650; rate_hz=120\n"
     "t_s,x,y,valid,conf\n0.000000,0.500000,0.250000,1,0.900\n0.008333,0.510000,0.250000,0,0.000\n# note\n\n0.02,nan,0,0,0\n")
 put("trace", "seed-view", "# gaze-trace v1; space=view_deg\nt_s,yaw_deg,pitch_deg,valid\n0,-5,2.5,1\n0.01,-5.5,2.5,1\n")
+put("trace", "seed-late", "# gaze-trace v1; space=view_deg\nt_s,yaw_deg,pitch_deg,valid\n0,-5,2.5,1\n1e19,-5.5,2.5,1\n")
+put("trace", "seed-dense", "# gaze-trace v1; space=view_deg\nt_s,yaw_deg,pitch_deg,valid\n0,-5,2.5,1\n1e-10,-5.5,2.5,1\n")
 
 block = bytearray(128)
 block[1:7] = b"\xff" * 6

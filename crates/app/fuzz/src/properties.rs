@@ -4,7 +4,7 @@ use super::parse::lsl_feed::{Feed, MAX_HEAD, Sample};
 use super::parse::lsl_info::{self, ChannelFormat, ClockReply, StreamInfo};
 use super::parse::opengaze::{CalibrationSummary, MAX_TAG, Splitter, Tag};
 use super::parse::pupil::{MAX_POINTS, SurfaceMessage};
-use super::parse::trace::Trace;
+use super::parse::trace::{MAX_SECS, MIN_STEP_SECS, Trace};
 use super::parse::zmtp::{self, MAX_FRAME, Message, Peer};
 use super::parse::{ParseError, edid};
 
@@ -149,13 +149,15 @@ pub fn pupil(data: &[u8]) {
     }
 }
 
-/// What is accepted increases in time, counts only finite points, and reads the same after it was written, up to the
-/// digits that are written.
+/// What is accepted lies within bounds and increases in time, counts only finite points, and reads the same after it was
+/// written, up to the digits that are written.
 pub fn trace(data: &[u8]) {
     let Some(trace) = std::str::from_utf8(data).ok().and_then(|text| Trace::parse(text).ok()) else { return };
-    assert!(trace.rows.windows(2).all(|pair| pair[0].time_secs < pair[1].time_secs));
+    assert!(trace.rows.iter().all(|row| row.time_secs.abs() <= MAX_SECS));
+    // At the farthest times a number of 64 bits is rounded to half a microsecond.
+    assert!(trace.rows.windows(2).all(|pair| pair[1].time_secs - pair[0].time_secs > 0.4 * MIN_STEP_SECS));
     assert!(trace.rows.iter().all(|row| row.point.iter().all(|value| value.is_finite())));
-    // Times closer than the microsecond that is written become equal.
+    // Times that lie a microsecond apart between written ones may be rounded to the same.
     if let Ok(again) = Trace::parse(&trace.write()) {
         assert_eq!(again.header, trace.header);
         assert_eq!(again.rows.len(), trace.rows.len());

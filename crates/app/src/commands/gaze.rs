@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use super::{print_json, print_text};
 use crate::cli::gaze::GazeArgs;
 use crate::gaze::lsl::resolve;
-use crate::gaze::parse::trace::{Header, Space};
+use crate::gaze::parse::trace::Header;
 use crate::gaze::recorder::Recorder;
 use crate::gaze::sample::{GazeSample, Point};
 use crate::gaze::source::{GazeSource, SourceState, SourceStatus};
@@ -206,9 +206,8 @@ fn record(
 ) -> anyhow::Result<()> {
     let Some(path) = &args.record else { return Ok(()) };
     if recorder.is_none() {
-        let space = if matches!(sample.point, Point::ViewDeg(_)) { Space::ViewDeg } else { Space::Screen01 };
-        let header = Header { space, source: spec.to_string(), ..Header::default() };
-        *recorder = Some(Recorder::create(path, &header)?);
+        let header = Header { source: spec.to_string(), ..Header::default() };
+        *recorder = Some(Recorder::create(path, header)?);
     }
     recorder.as_mut().map_or(Ok(()), |recorder| recorder.write(sample))
 }
@@ -225,7 +224,7 @@ fn finish(
         eprintln!();
     }
     let status = source.status();
-    let rows = recorder.map(Recorder::finish).transpose()?;
+    let recorded = recorder.map(Recorder::finish).transpose()?;
     if figures.samples == 0 {
         return Err(anyhow::anyhow!("{}", status.state)).with_context(|| spec.to_string());
     }
@@ -233,10 +232,7 @@ fn finish(
     if args.json {
         return print_json(&report);
     }
-    let recorded = match (rows, &args.record) {
-        (Some(rows), Some(path)) => format!("{rows} rows in {}\n", path.display()),
-        _ => String::new(),
-    };
+    let recorded = recorded.map(|recorded| format!("{recorded}\n")).unwrap_or_default();
     print_text(&format!(
         "{recorded}{} samples, {} valid, {:.1} Hz, {} gaps, {} reconnections\n",
         figures.samples,

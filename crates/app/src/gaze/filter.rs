@@ -56,6 +56,8 @@ const BEFORE_BLINK_SECS: f64 = 0.05;
 const AFTER_BLINK_SECS: f64 = 0.1;
 /// After so long without a valid sample the eye is lost, seconds.
 pub const LOST_SECS: f64 = 0.5;
+/// Samples that are kept at most, whatever their times: those of a source whose clock is set wrongly stand still or run back.
+const MOST_KEPT: usize = 1024;
 /// Speeds by which noise is measured.
 const SPEEDS: usize = 128;
 /// Speeds that are needed before they say anything.
@@ -197,10 +199,7 @@ impl GazeFilter {
         if let Some(interval) = since_last.filter(|interval| *interval < 5.0) {
             self.interval_secs = Some(self.interval_secs.map_or(interval, |known| known + 0.1 * (interval - known)));
         }
-        self.recent.push_back((time_secs, point));
-        while self.recent.front().is_some_and(|(time, _)| time_secs - time > 0.1) {
-            self.recent.pop_front();
-        }
+        push_recent(&mut self.recent, (time_secs, point), 0.1);
         let Some(current) = self.current else { return self.restart(time_secs, point, 1.0, Phase::Fixation) };
         if let Some(speed) = self.speed(time_secs, point) {
             let noise = self.speed_noise();
@@ -293,10 +292,15 @@ impl GazeFilter {
     }
 
     fn keep(&mut self, time_secs: f64, point_deg: [f64; 2]) {
-        self.outputs.push_back((time_secs, point_deg));
-        while self.outputs.front().is_some_and(|(time, _)| time_secs - time > 0.2) {
-            self.outputs.pop_front();
-        }
+        push_recent(&mut self.outputs, (time_secs, point_deg), 0.2);
+    }
+}
+
+/// Adds the newest and takes away what is older than so many seconds.
+fn push_recent(kept: &mut VecDeque<(f64, [f64; 2])>, newest: (f64, [f64; 2]), secs: f64) {
+    kept.push_back(newest);
+    while kept.len() > MOST_KEPT || kept.front().is_some_and(|(time, _)| newest.0 - time > secs) {
+        kept.pop_front();
     }
 }
 
@@ -346,6 +350,16 @@ mod tests {
             last = x - answer.point_deg[0];
         }
         assert!((0.0..1.0).contains(&last), "lags by {last} deg at 10 deg/s");
+    }
+
+    #[test]
+    fn a_clock_that_stands_still_fills_no_memory() {
+        let mut filter = filter();
+        filter.update(5.0, Some([0.0; 2]));
+        for step in 0..20_000 {
+            filter.update(0.0, Some([f64::from(step % 7) * 0.01, 0.0]));
+        }
+        assert!(filter.recent.len() <= MOST_KEPT && filter.outputs.len() <= MOST_KEPT);
     }
 
     #[test]

@@ -79,6 +79,8 @@ pub struct HubReport {
     pub timing: timing::TimingReport,
     /// Rows of the running recording.
     pub recording: Option<u64>,
+    /// How the last recording ended.
+    pub recorded: Option<String>,
 }
 
 struct Entry {
@@ -150,7 +152,10 @@ struct Hub {
     stated_accuracy_deg: Option<f64>,
     live: Option<Live>,
     raw: VecDeque<(Instant, [f64; 2])>,
+    /// The source's place in the list, and its recording.
     recording: Option<(usize, Recorder)>,
+    /// How the last recording ended.
+    recorded: Option<String>,
     timing: Timing,
 }
 
@@ -179,6 +184,7 @@ impl GazeHub {
             live: None,
             raw: VecDeque::new(),
             recording: None,
+            recorded: None,
             timing: Timing::default(),
         })))
     }
@@ -188,7 +194,7 @@ impl GazeHub {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Uses other sources from now on.
+    /// Uses other sources from now on; a recording ends.
     ///
     /// # Errors
     /// A recording that cannot be read; the sources are then as they were.
@@ -202,6 +208,8 @@ impl GazeHub {
                 None => wanted.push(Err(Entry::open(spec)?)),
             }
         }
+        // A trace is of one source: another has another clock.
+        let ended = hub.end_recording().map(|how| format!("; the recording has ended: {how}")).unwrap_or_default();
         let mut old: Vec<Option<Entry>> = std::mem::take(&mut hub.entries).into_iter().map(Some).collect();
         for entry in wanted {
             hub.entries.extend(entry.map_or_else(Some, |known| old.get_mut(known).and_then(Option::take)));
@@ -209,7 +217,7 @@ impl GazeHub {
         let last = hub.entries.len().saturating_sub(1);
         hub.active = last;
         hub.restart_filter();
-        hub.note = Some((format!("gaze: {}", hub.name(0)), now));
+        hub.note = Some((format!("gaze: {}{ended}", hub.name(0)), now));
         Ok(())
     }
 
@@ -268,13 +276,13 @@ impl GazeHub {
         self.lock().entries.get_mut(index).is_some_and(|entry| entry.source.calibrate())
     }
 
-    /// Records the preferred source, or the active one when that is the pointer.
+    /// Records the preferred source, also while another stands in for it.
     ///
     /// # Errors
     /// When the file exists or cannot be written.
     pub fn record(&self, path: &Path) -> anyhow::Result<()> {
         let mut hub = self.lock();
-        let source = hub.active;
+        let source = hub.preferred();
         let screen = hub.place.screen;
         let header = Header {
             source: hub.name(source),
@@ -282,17 +290,14 @@ impl GazeHub {
             distance_mm: Some(screen.distance_mm.into()),
             ..Header::default()
         };
-        hub.recording = Some((source, Recorder::create(path, &header)?));
+        hub.recording = Some((source, Recorder::create(path, header)?));
+        hub.recorded = None;
         Ok(())
     }
 
-    /// Ends the recording; how many rows it has, or `None` when none ran.
-    ///
-    /// # Errors
-    /// When the file could not be written.
-    pub fn stop_recording(&self) -> anyhow::Result<Option<u64>> {
-        let recording = self.lock().recording.take();
-        recording.map(|(_, recorder)| recorder.finish()).transpose()
+    /// Ends the recording and says what it came to; `None` when none ran.
+    pub fn stop_recording(&self) -> Option<String> {
+        self.lock().end_recording()
     }
 
     /// What the window shows about gaze.
@@ -312,6 +317,7 @@ impl GazeHub {
             phase: hub.phase,
             timing: hub.timing.report(),
             recording: hub.recording.as_ref().map(|(_, recorder)| recorder.rows()),
+            recorded: hub.recorded.clone(),
         }
     }
 }
@@ -329,6 +335,19 @@ fn open_all(specs: &[SourceSpec]) -> anyhow::Result<Vec<Entry>> {
 impl Hub {
     fn name(&self, index: usize) -> String {
         self.entries.get(index).map(|entry| entry.spec.to_string()).unwrap_or_default()
+    }
+
+    /// The first tracker before any pointer, of those that have shown an eye if any has.
+    fn preferred(&self) -> usize {
+        let mut trackers = self.entries.iter().take_while(|entry| entry.source.is_eye());
+        trackers.position(|entry| entry.last_valid.is_some()).unwrap_or(0)
+    }
+
+    fn end_recording(&mut self) -> Option<String> {
+        let (_, recorder) = self.recording.take()?;
+        let how = recorder.finish().map_or_else(|error| format!("{error:#}"), |recorded| recorded.to_string());
+        self.recorded = Some(how.clone());
+        Some(how)
     }
 
     fn restart_filter(&mut self) {
@@ -425,8 +444,10 @@ impl Hub {
                 other => other,
             };
             if let Err(error) = recorder.write(&GazeSample { point, ..*sample }) {
-                self.note = Some((format!("the recording has ended: {error:#}"), now));
-                self.recording = None;
+                let how = self.end_recording().unwrap_or_default();
+                let text = format!("the recording has ended: {error:#}; {how}");
+                self.recorded = Some(text.clone());
+                self.note = Some((text, now));
                 return;
             }
         }

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::clock::DeviceClock;
 use super::feed::{Ended, FeedSource, Link, Outlet};
+use super::parse::excerpt;
 use super::parse::opengaze::{CalibrationSummary, Splitter, Tag};
 use super::sample::Point;
 use super::source::{Calibration, SourceState, TrackedScreen};
@@ -95,7 +96,7 @@ impl Session {
                 return Err(Ended::Failed(format!("the tracker refuses {id}")));
             }
             ("NACK", Some(id)) if id.starts_with("CALIBRATE") => {
-                self.calibrated(outlet, Calibration::Failed(id.to_owned()));
+                self.calibrated(outlet, Calibration::Failed(excerpt(id)));
             }
             ("CAL", Some("CALIB_RESULT")) if self.calibrating.is_some() => {
                 stream.write_all(

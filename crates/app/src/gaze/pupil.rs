@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use super::clock::DeviceClock;
 use super::feed::{Ended, FeedSource, Link, Outlet};
+use super::parse::excerpt;
 use super::parse::pupil::SurfaceMessage;
 use super::parse::zmtp::{self, Peer};
 use super::sample::Point;
@@ -107,8 +108,10 @@ impl PupilCore {
         let mut remote = Socket::open(outlet, &self.host, self.port, "REQ")?;
         let mut clock = DeviceClock::new(Instant::now());
         let answer = remote.ask(outlet, "SUB_PORT")?;
-        let port: u16 =
-            answer.trim().parse().map_err(|_| Ended::Lost(format!("Pupil Remote names the port `{answer}`")))?;
+        let port: u16 = answer
+            .trim()
+            .parse()
+            .map_err(|_| Ended::Lost(format!("Pupil Remote names the port `{}`", excerpt(&answer))))?;
         if let Some(offset) = clock_offset(&mut remote, outlet, &clock)? {
             clock.set_offset(offset);
         }

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 
+use super::feed::MAX_SAMPLES;
 use super::parse::trace::{Space, Trace};
 use super::sample::{GazeSample, Point};
 use super::source::{GazeSource, SourceState, SourceStatus};
@@ -49,6 +50,11 @@ impl Replay {
     }
 }
 
+/// A time so many seconds later; `None` beyond what the clock counts.
+fn later(start: Instant, secs: f64) -> Option<Instant> {
+    start.checked_add(Duration::try_from_secs_f64(secs).ok()?)
+}
+
 /// The point of a trace's row as a sample has it.
 pub fn point(space: Space, point: [f64; 2]) -> Point {
     match space {
@@ -78,22 +84,22 @@ impl GazeSource for Replay {
             (self.start, self.next) = (Some(now), 0);
             self.before_secs += self.round_secs();
         }
-        loop {
+        // What is more than a busy reader gets from a tracker comes with the next call, so that no trace holds the reader up.
+        let most = samples.len() + MAX_SAMPLES;
+        while samples.len() < most {
             let Some(row) = self.trace.rows.get(self.next) else {
                 if !self.repeats {
                     return;
                 }
                 let round = self.round_secs();
-                start += Duration::try_from_secs_f64(round).unwrap_or_default();
+                let Some(next) = later(start, round) else { return };
+                start = next;
                 self.start = Some(start);
                 self.before_secs += round;
                 self.next = 0;
                 continue;
             };
-            let due = start + Duration::try_from_secs_f64(row.time_secs - first).unwrap_or_default();
-            if due > now {
-                return;
-            }
+            let Some(due) = later(start, row.time_secs - first).filter(|due| *due <= now) else { return };
             samples.push(GazeSample {
                 device_secs: self.before_secs + row.time_secs,
                 captured: due,
@@ -112,6 +118,7 @@ impl GazeSource for Replay {
 #[expect(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
+    use crate::gaze::parse::trace::Row;
 
     const TEXT: &str = "# gaze-trace v1; space=screen01\n10,0.1,0.1,1,1\n10.5,0.2,0.2,0,0\n11,0.3,0.3,1,1\n";
 
@@ -144,5 +151,34 @@ mod tests {
         assert_eq!(all, [10.0, 10.5, 11.0, 11.5, 12.0, 12.5, 13.0, 13.5]);
         let late = times(&mut replay, start + Duration::from_secs(3600));
         assert!(late.len() <= 1 && late.iter().all(|time| *time > 13.5), "{late:?}");
+    }
+
+    #[test]
+    fn a_trace_of_any_times_neither_panics_nor_holds_up_the_reader() {
+        let start = Instant::now();
+        for secs in [[0.0, 1e19], [0.0, 1e-10], [0.0, 0.0], [f64::MIN, f64::MAX], [1.0, 0.0], [f64::NAN, 0.0]] {
+            let row = |time_secs| Row { time_secs, point: [0.5; 2], valid: true, confidence: 1.0 };
+            let trace = Trace { rows: secs.map(row).to_vec(), ..Trace::default() };
+            for repeats in [false, true] {
+                let mut replay = Replay::new("t".into(), trace.clone(), repeats);
+                for wait in [0, 1, 1_000_000, 1_000_000_000] {
+                    let mut samples = Vec::new();
+                    replay.poll(start + Duration::from_micros(wait), &mut samples);
+                    assert!(samples.len() <= MAX_SAMPLES, "{secs:?}: {}", samples.len());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_left_over_by_one_call_comes_with_the_next() {
+        let start = Instant::now();
+        let rows = (0..10_000).map(|step| format!("{},0.1,0.1,1,1\n", f64::from(step) * 1e-3));
+        let text = format!("# gaze-trace v1; space=screen01\n{}", rows.collect::<String>());
+        let mut replay = Replay::new("t".into(), Trace::parse(&text).unwrap(), false);
+        times(&mut replay, start);
+        let after_a_minute = start + Duration::from_secs(60);
+        let counts = [0; 3].map(|_| times(&mut replay, after_a_minute).len());
+        assert_eq!(counts, [MAX_SAMPLES, MAX_SAMPLES, 9_999 - 2 * MAX_SAMPLES]);
     }
 }

@@ -1,6 +1,6 @@
 //! What the window does about gaze: the screen it is on, who sits before it, dots to look at, recording.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -65,7 +65,6 @@ pub struct GazeControl {
     pub outcome: Option<String>,
     /// Whether the person has agreed to be recorded.
     pub consents: bool,
-    recording: Option<PathBuf>,
     note: Option<(String, Instant)>,
 }
 
@@ -98,7 +97,6 @@ impl GazeControl {
             dots: None,
             outcome: None,
             consents: false,
-            recording: None,
             note: trouble.map(|text| (text, Instant::now())),
         }
     }
@@ -265,27 +263,20 @@ impl GazeControl {
         }
     }
 
-    /// Begins or ends a recording, into a new file of the working directory.
-    pub fn toggle_recording(&mut self, now: Instant) {
-        let text = match self.recording.take() {
-            Some(path) => match self.hub.stop_recording() {
-                Ok(Some(rows)) => format!("{rows} rows in {}", path.display()),
-                Ok(None) => "the recording had ended before".into(),
-                Err(error) => format!("{error:#}"),
-            },
-            None if !self.consents => "a recording needs the consent of whoever looks".into(),
-            None => {
-                let path = free_name(Path::new(""), "gaze", "csv");
-                match self.hub.record(&path) {
-                    Ok(()) => {
-                        let text = format!("recording gaze to {}", path.display());
-                        self.recording = Some(path);
-                        text
-                    }
-                    Err(error) => format!("{error:#}"),
-                }
-            }
+    /// Begins a recording, into a new file of the working directory.
+    pub fn start_recording(&mut self, now: Instant) {
+        let path = free_name(Path::new(""), "gaze", "csv");
+        let text = match self.consents.then(|| self.hub.record(&path)) {
+            Some(Ok(())) => format!("recording gaze to {}", path.display()),
+            Some(Err(error)) => format!("{error:#}"),
+            None => "a recording needs the consent of whoever looks".into(),
         };
+        self.note = Some((text, now));
+    }
+
+    /// Ends it.
+    pub fn stop_recording(&mut self, now: Instant) {
+        let text = self.hub.stop_recording().unwrap_or_else(|| "the recording had ended before".into());
         self.note = Some((text, now));
     }
 

@@ -8,8 +8,8 @@ use super::gaze_control::{GazeControl, ScreenKnown};
 use super::navigation::point_in_window;
 use super::theme;
 use crate::gaze::filter::Phase;
-use crate::gaze::hub::SourceReport;
 use crate::gaze::hub::timing::{TOO_OLD, TimingReport};
+use crate::gaze::hub::{HubReport, SourceReport};
 use crate::gaze::source::{Calibration, SourceState};
 use crate::gaze::validation::Purpose;
 
@@ -36,7 +36,7 @@ pub fn panel(ctx: &Context, gaze: &mut GazeControl, offset: f32, now: Instant) {
             }
             screen(ui, gaze, now);
             ui.separator();
-            recording(ui, gaze, report.recording, now);
+            recording(ui, gaze, &report, now);
         });
     });
 }
@@ -171,11 +171,11 @@ fn screen(ui: &mut Ui, gaze: &mut GazeControl, now: Instant) {
     }
 }
 
-fn recording(ui: &mut Ui, gaze: &mut GazeControl, rows: Option<u64>, now: Instant) {
-    if let Some(rows) = rows {
+fn recording(ui: &mut Ui, gaze: &mut GazeControl, report: &HubReport, now: Instant) {
+    if let Some(rows) = report.recording {
         ui.label(RichText::new(format!("recording, {rows} rows")).color(theme::error(ui)));
         if ui.button("Stop").clicked() {
-            gaze.toggle_recording(now);
+            gaze.stop_recording(now);
         }
         return;
     }
@@ -186,7 +186,10 @@ fn recording(ui: &mut Ui, gaze: &mut GazeControl, rows: Option<u64>, now: Instan
         ui.add(egui::Label::new(RichText::new(consent).small().weak()).wrap());
     }
     if ui.add_enabled(gaze.consents, egui::Button::new("Record")).clicked() {
-        gaze.toggle_recording(now);
+        gaze.start_recording(now);
+    }
+    if let Some(how) = &report.recorded {
+        ui.add(egui::Label::new(RichText::new(how).small()).wrap());
     }
 }
 

@@ -3,6 +3,7 @@
 use super::*;
 use crate::gaze::drift::DriftCorrection;
 use crate::gaze::geometry::RectPx;
+use crate::gaze::parse::trace::{Space, Trace};
 use crate::screen::ScreenGeometry;
 
 const START_MS: u64 = 10_000;
@@ -141,10 +142,94 @@ fn the_pointer_is_recorded_as_fractions_of_the_screen() {
     hub.record(&path).unwrap();
     run(&hub, start, 60, 200);
     assert_eq!(hub.report(start).recording, Some(15));
-    assert_eq!(hub.stop_recording().unwrap(), Some(15));
-    assert_eq!(hub.stop_recording().unwrap(), None);
-    let trace = crate::gaze::parse::trace::Trace::parse(&std::fs::read_to_string(&path).unwrap()).unwrap();
+    let how = hub.stop_recording();
+    assert_eq!(how, Some(format!("15 rows in {}", path.display())));
+    assert_eq!((hub.stop_recording(), hub.report(start).recorded), (None, how));
+    let trace = Trace::parse(&std::fs::read_to_string(&path).unwrap()).unwrap();
     assert!(trace.rows.iter().all(|row| row.point == [0.25, 0.375] && row.valid), "{:?}", trace.rows[0]);
     assert_eq!((trace.header.source.as_str(), trace.header.distance_mm), ("mouse", Some(600.0)));
     std::fs::remove_file(path).unwrap();
+}
+
+/// A path for a recording, and what was recorded there.
+fn recording(name: &str) -> (std::path::PathBuf, impl Fn() -> Trace) {
+    let path = std::env::temp_dir().join(format!("fovea-hub-{name}-{}.csv", std::process::id()));
+    let _ = std::fs::remove_file(&path);
+    let read = path.clone();
+    (path, move || {
+        let text = std::fs::read_to_string(&read).unwrap();
+        std::fs::remove_file(&read).unwrap();
+        Trace::parse(&text).unwrap()
+    })
+}
+
+#[test]
+fn another_source_ends_the_recording_and_what_was_recorded_is_kept() {
+    let start = Instant::now() + Duration::from_millis(START_MS);
+    let (hub, path) = hub(0);
+    run(&hub, start, 0, 300);
+    let (to, recorded) = recording("chosen");
+    hub.record(&to).unwrap();
+    run(&hub, start, 310, 500);
+    let missing = SourceSpec::Trace("no/such/trace.csv".into(), false);
+    assert!(hub.choose(&[missing], start).is_err());
+    assert_eq!(hub.report(start).recording, Some(20), "what cannot be chosen ends nothing");
+    hub.choose(&[SourceSpec::Mouse], start).unwrap();
+    let report = hub.report(start);
+    let how = format!("20 rows in {}", to.display());
+    assert_eq!((report.recording, report.recorded), (None, Some(how.clone())));
+    assert!(report.note.is_some_and(|(text, _)| text.contains("mouse") && text.contains(&how)));
+    run(&hub, start, 510, 700);
+    let trace = recorded();
+    assert_eq!((trace.rows.len(), trace.rows[0].point), (20, [0.75, 0.5]));
+    assert_eq!(trace.header.source, SourceSpec::Trace(path.clone(), false).to_string());
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn a_tracker_that_is_lost_when_the_recording_begins_is_recorded_all_the_same() {
+    let start = Instant::now() + Duration::from_millis(START_MS);
+    let (hub, path) = hub(1500);
+    let lost = run(&hub, start, 0, 1800);
+    assert!(near(lost, -0.5, 0.25), "the pointer: {lost:?}");
+    let (to, recorded) = recording("lost");
+    hub.record(&to).unwrap();
+    run(&hub, start, 1810, 3500);
+    hub.stop_recording().unwrap();
+    let trace = recorded();
+    assert_eq!(trace.header.source, SourceSpec::Trace(path.clone(), false).to_string());
+    assert!(trace.rows.len() > 90 && trace.rows.iter().all(|row| row.point == [0.75, 0.5]));
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn a_tracker_that_never_came_leaves_the_recording_to_the_next() {
+    let start = Instant::now() + Duration::from_millis(START_MS);
+    let (first, path) = hub(0);
+    drop(first);
+    let trace = SourceSpec::Trace(path.clone(), false);
+    let hub = GazeHub::new(&[SourceSpec::OpenGaze("127.0.0.1".into(), 1), trace.clone()], None).unwrap();
+    run(&hub, start, 0, 300);
+    let (to, recorded) = recording("absent");
+    hub.record(&to).unwrap();
+    run(&hub, start, 310, 400);
+    hub.stop_recording().unwrap();
+    assert_eq!(recorded().header.source, trace.to_string());
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn degrees_are_recorded_as_degrees() {
+    let start = Instant::now() + Duration::from_millis(START_MS);
+    let rows = (0..100).map(|step| format!("{:.2},-5,2.5,1\n", f64::from(step) * 0.01));
+    let (from, played) = recording("played-deg");
+    std::fs::write(&from, format!("# gaze-trace v1; space=view_deg\n{}", rows.collect::<String>())).unwrap();
+    let hub = GazeHub::new(&[SourceSpec::Trace(from, false)], None).unwrap();
+    let (to, recorded) = recording("deg");
+    hub.record(&to).unwrap();
+    run(&hub, start, 0, 500);
+    hub.stop_recording().unwrap();
+    let (trace, played) = (recorded(), played());
+    assert_eq!(trace.header.space, Space::ViewDeg);
+    assert_eq!(trace.rows, played.rows[..51]);
 }

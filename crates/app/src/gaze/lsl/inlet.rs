@@ -10,6 +10,7 @@ use super::mapping::{Channels, Mapping};
 use super::resolve::{self, Found};
 use crate::gaze::clock::DeviceClock;
 use crate::gaze::feed::{Ended, Link, Outlet};
+use crate::gaze::parse::excerpt;
 use crate::gaze::parse::lsl_feed::{Feed, Sample};
 use crate::gaze::parse::lsl_info::{ClockReply, StreamInfo};
 use crate::gaze::source::SourceState;
@@ -106,9 +107,9 @@ fn describe(info: &StreamInfo, found: &Found, mapping: &Mapping) -> String {
     let guess = if unnamed && *mapping == Mapping::guess(info) { ", channels 0 and 1 by guess" } else { "" };
     format!(
         "{} ({}) on {}{guess}",
-        info.name,
-        info.kind,
-        if info.hostname.is_empty() { found.address.to_string() } else { info.hostname.clone() }
+        excerpt(&info.name),
+        excerpt(&info.kind),
+        if info.hostname.is_empty() { found.address.to_string() } else { excerpt(&info.hostname) }
     )
 }
 
@@ -199,8 +200,29 @@ fn measure(service: SocketAddr, clock: &DeviceClock) -> std::io::Result<Option<f
 }
 
 #[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_a_stream_calls_itself_is_shown_as_a_line() {
+        let long = "long name ".repeat(10_000);
+        let xml = format!(
+            "<info><name>a&#10;{long}</name><type>{long}</type><hostname>{long}</hostname><channel_count>1</channel_count>\
+            <channel_format>int8</channel_format><nominal_srate>60</nominal_srate><uid>u</uid>\
+            <v4data_port>1</v4data_port><v4service_port>1</v4service_port>\
+            <desc><channels><channel><label>{long}</label></channel></channels></desc></info>"
+        );
+        let info = StreamInfo::from_xml(&xml).unwrap();
+        let found = Found { info: info.clone(), address: std::net::Ipv4Addr::LOCALHOST.into() };
+        let mapping = Mapping::guess(&info);
+        let described = describe(&info, &found, &mapping);
+        assert!(described.starts_with("a?long name") && described.len() < 300, "{described}");
+        let missing = mapping.resolve(&info).unwrap_err();
+        assert!(missing.len() < 300, "{missing}");
+        let labelled = Mapping::preset("pupil").and_then(|mapping| mapping.resolve(&info).err()).unwrap();
+        assert!(labelled.contains("long name") && labelled.len() < 300, "{labelled}");
+    }
 
     #[test]
     fn a_time_that_is_not_sent_follows_from_the_rate() {

@@ -1,7 +1,11 @@
 //! Which channels of a stream hold the gaze, in which unit and from which corner.
 
+use crate::gaze::parse::excerpt;
 use crate::gaze::parse::lsl_info::{Channel, StreamInfo};
 use crate::gaze::sample::Point;
+
+/// Labels of a stream that a message names.
+const LABELS_SAID: usize = 32;
 
 /// A channel by its place, from 0, or by its label.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -25,7 +29,8 @@ impl Selector {
             Self::Index(index) => Err(format!("channel {index} of a stream with {}", info.channel_count)),
             Self::Label(label) => {
                 labels.iter().position(|channel| channel.label.eq_ignore_ascii_case(label)).ok_or_else(|| {
-                    let known: Vec<&str> = labels.iter().map(|channel| channel.label.as_str()).collect();
+                    let known: Vec<String> =
+                        labels.iter().take(LABELS_SAID).map(|channel| excerpt(&channel.label)).collect();
                     format!("no channel `{label}`; there are: {}", known.join(", "))
                 })
             }

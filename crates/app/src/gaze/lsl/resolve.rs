@@ -20,6 +20,8 @@ const GROUPS: [Ipv4Addr; 4] = [
 ];
 /// How often the question is asked again.
 const REPEAT: Duration = Duration::from_millis(500);
+/// How long a description may take to come as a whole.
+const DESCRIPTION: Duration = Duration::from_secs(3);
 /// Streams that are listed.
 const MAX_STREAMS: usize = 64;
 
@@ -101,9 +103,17 @@ pub fn full_info(found: &Found) -> Result<StreamInfo, Ended> {
     let mut stream = std::net::TcpStream::connect_timeout(&address, Duration::from_secs(2))?;
     stream.set_read_timeout(Some(Duration::from_secs(2)))?;
     stream.write_all(b"LSL:fullinfo\r\n")?;
-    let mut xml = Vec::new();
+    let (mut xml, mut part, asked) = (Vec::new(), [0; 16_384], Instant::now());
     // One byte beyond the limit tells a description that is too long from one that just fits.
-    stream.take(MAX_XML as u64 + 1).read_to_end(&mut xml)?;
+    while xml.len() <= MAX_XML {
+        if asked.elapsed() > DESCRIPTION {
+            return Err(Ended::Lost("the stream's description does not end".into()));
+        }
+        match stream.read(&mut part)? {
+            0 => break,
+            count => xml.extend_from_slice(&part[..count]),
+        }
+    }
     let xml = String::from_utf8(xml).map_err(|_| Ended::Failed("the stream's description is not text".into()))?;
     StreamInfo::from_xml(&xml).map_err(|error| Ended::Failed(error.to_string()))
 }
@@ -112,6 +122,27 @@ pub fn full_info(found: &Found) -> Result<StreamInfo, Ended> {
 #[expect(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_description_that_does_not_end_is_given_up() {
+        let listener = std::net::TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+        let data_port = listener.local_addr().unwrap().port();
+        std::thread::spawn(move || {
+            let (mut stream, _) = listener.accept().unwrap();
+            // Until the other side hangs up.
+            while stream.write_all(b" ").is_ok() {
+                std::thread::sleep(Duration::from_millis(50));
+            }
+        });
+        let xml = format!(
+            "<info><channel_count>2</channel_count><channel_format>float32</channel_format><nominal_srate>60\
+            </nominal_srate><uid>u</uid><v4data_port>{data_port}</v4data_port><v4service_port>1</v4service_port></info>"
+        );
+        let found = Found { info: StreamInfo::from_xml(&xml).unwrap(), address: Ipv4Addr::LOCALHOST.into() };
+        let asked = Instant::now();
+        assert!(matches!(full_info(&found), Err(Ended::Lost(why)) if why.contains("does not end")));
+        assert!(asked.elapsed() < 3 * DESCRIPTION);
+    }
 
     #[test]
     fn only_the_host_that_was_named_is_asked() {

@@ -237,6 +237,8 @@ mod tests {
         }
         let other = StreamInfo::from_xml("<html><body/></html>").unwrap_err().to_string();
         assert!(other.contains("<html>"), "{other}");
+        let nested = StreamInfo::from_xml(&"<a>".repeat(MAX_XML / 3)).unwrap_err();
+        assert!(nested.to_string().contains("XML"), "and the stack does not overflow: {nested}");
         let long = StreamInfo::from_xml(&" ".repeat(MAX_XML + 1)).unwrap_err();
         assert!(matches!(long, ParseError::TooLong { .. }));
         for datagram in [&b"no line"[..], b"\xff\n<info/>", b""] {

@@ -1,7 +1,8 @@
 //! Gaze traces: `# gaze-trace v1; key=value; ...`, then rows of comma-separated numbers.
 //!
 //! `space=screen01`: `t_s,x,y,valid,conf`, fractions of the screen from its top left. `space=view_deg`:
-//! `t_s,yaw_deg,pitch_deg,valid`, + to the right and + up. Times strictly increase; rows that are not valid are kept.
+//! `t_s,yaw_deg,pitch_deg,valid`, + to the right and + up. Times lie within [`MAX_SECS`] and increase by
+//! [`MIN_STEP_SECS`] or more; rows that are not valid are kept.
 
 use std::fmt::Write;
 
@@ -11,6 +12,11 @@ use super::{ParseError, excerpt, finite};
 pub const MAX_ROWS: usize = 26_000_000;
 /// Bytes of the longest row that is read.
 pub const MAX_ROW: usize = 4096;
+/// Farthest time from 0, either way, seconds: clocks that count from 1970 reach it in 2096, and up to there a number of 64
+/// bits tells microseconds apart.
+pub const MAX_SECS: f64 = 4e9;
+/// Shortest time between two rows, seconds: the last digit that is written.
+pub const MIN_STEP_SECS: f64 = 1e-6;
 
 /// What the two coordinates of a row are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -153,6 +159,9 @@ impl Row {
         if !time_secs.is_finite() {
             return Err("the time is not finite".into());
         }
+        if time_secs.abs() > MAX_SECS {
+            return Err(format!("the time {time_secs:e} s is beyond +-{MAX_SECS:e} s"));
+        }
         let point = [number(fields[1])?, number(fields[2])?];
         let finite = point.iter().all(|value| value.is_finite());
         if valid && !finite {
@@ -204,8 +213,13 @@ impl Trace {
                 return Err(wrong("longer than any trace".into()));
             }
             let row = Row::parse(line, header.space).map_err(wrong)?;
-            if rows.last().is_some_and(|last| row.time_secs <= last.time_secs) {
-                return Err(wrong("the time does not increase".into()));
+            if let Some(last) = rows.last() {
+                let step = row.time_secs - last.time_secs;
+                // Two decimal times a microsecond apart can be a little less as binary ones.
+                let rounding = f64::EPSILON * row.time_secs.abs().max(last.time_secs.abs());
+                if step <= 0.0 || step + rounding < MIN_STEP_SECS {
+                    return Err(wrong(format!("the time does not increase by {MIN_STEP_SECS:e} s or more")));
+                }
             }
             rows.push(row);
         }
@@ -268,10 +282,19 @@ mod tests {
             ("0.500000", "inf", "not finite"),
             ("0.008333", "-1", "line 4"),
             ("0.008333", "NaN", "time"),
+            ("0.008333", "1e19", "line 4: the time 1e19 s"),
+            ("0.000000", "-4.1e9", "line 3: the time"),
+            ("0.008333", "1e-10", "line 4: the time does not increase by"),
         ] {
             let error = Trace::parse(&TEXT.replace(from, to)).unwrap_err().to_string();
             assert!(error.contains(reason), "{from} -> {to}: {error}");
         }
+        for (from, to) in [("0.000000", "0.008332"), ("0.008333", "4e9")] {
+            assert!(Trace::parse(&TEXT.replace(from, to)).is_ok(), "{from} -> {to}");
+        }
+        let latest = TEXT.replace("0.000000,", "3999999999.999998,").replace("0.008333,", "3999999999.999999,");
+        let latest = Trace::parse(&latest).unwrap();
+        assert_eq!(Trace::parse(&latest.write()).unwrap(), latest, "microseconds are told apart");
         assert!(Trace::parse("").is_err());
         assert!(Trace::parse("# gaze-trace v1; space=screen01\n").unwrap_err().to_string().contains("without rows"));
         assert!(Trace::parse(&format!("{TEXT}{}", "9".repeat(MAX_ROW + 1))).is_err());
