@@ -2,7 +2,11 @@
 //! contains only what its scene needs.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::{collections::BTreeSet, sync::Arc};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use fovea_tests::{device, scenes};
 use glam::Vec3;
@@ -30,6 +34,30 @@ fn sources() -> Arc<ShaderSources> {
 fn key(kernel: Kernel, features: SceneFeatures, sources: &Arc<ShaderSources>) -> KernelKey {
     let constants = KernelConstants { stack_size: 16, environment_cells: [64, 32] };
     KernelKey { kernel, features, constants, sources: sources.clone() }
+}
+
+/// What a module's header calls its twin is there.
+#[test]
+fn twins_exist() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let modules = walk(&root.join("shaders"));
+    let mut named = 0;
+    for module in modules {
+        let text = std::fs::read_to_string(&module).unwrap();
+        for word in text.split(|c: char| c.is_whitespace() || "(),;".contains(c)) {
+            let path = word.trim_end_matches('.');
+            if path.contains("/src/") && path.ends_with(".rs") {
+                assert!(root.join("crates").join(path).exists(), "{}: {path}", module.display());
+                named += 1;
+            }
+        }
+    }
+    assert!(named > 30, "{named}");
+}
+
+fn walk(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    entries.flat_map(|path| if path.is_dir() { walk(&path) } else { vec![path] }).collect()
 }
 
 /// None, each alone, each one left out, and all.

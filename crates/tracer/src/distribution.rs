@@ -252,8 +252,9 @@ impl Distribution {
         for (weight, layer) in &self.layers {
             let share = weight / sum;
             if u < lower + share {
-                let Layer::Acuity { radius_scale, .. } = layer else { return 1.0 };
-                let radius = |x: f32| self.inverse.eval_versine(x * radius_scale);
+                let Layer::Acuity { .. } = layer else { return 1.0 };
+                let reach = self.radius_of_interest(layer);
+                let radius = |x: f32| self.inverse.eval_versine(x * reach);
                 let x = ((u - lower) / share).clamp(STEP, 1.0 - STEP);
                 return ((radius(x + STEP) - radius(x - STEP)) / (2.0 * radius(STEP))).max(1.0);
             }
@@ -274,10 +275,11 @@ impl Distribution {
             Layer::Sphere => pixel / (4.0 * PI),
             Layer::ImagePlane(view) => pixel / (4.0 * f64::from(view.half_extent.x) * f64::from(view.half_extent.y)),
             Layer::Pixels(list) => 1.0 / list.len().max(1) as f64,
-            Layer::Acuity { radius_scale, .. } => {
+            Layer::Acuity { .. } => {
                 // About the gaze the density is flat.
                 let u = 1e-3;
-                pixel * f64::from(u) / (2.0 * PI * f64::from(self.inverse.eval_versine(u * radius_scale)))
+                let radius = self.inverse.eval_versine(u * self.radius_of_interest(layer));
+                pixel * f64::from(u) / (2.0 * PI * f64::from(radius))
             }
         }
     }
@@ -509,11 +511,15 @@ mod tests {
 
     use super::*;
 
-    fn encoded(view: View) -> Encoded {
+    fn foveated(view: Option<View>) -> Distribution {
         let acuity = RadialDistribution::new(Reddy2001, Geometry::Sphere, Angle::from_degrees(80.0), 0.002);
         let inverse = Arc::new(Inverse::default_for(&acuity.expect("valid constants")));
-        let clip = Clip { view, margin: 0.0, unclipped_share: 0.0 };
-        let foveated = Distribution::foveated(Gaze::Scene { direction: Vec3::NEG_Z }, Some(clip), inverse);
+        let clip = view.map(|view| Clip { view, margin: 0.0, unclipped_share: 0.0 });
+        Distribution::foveated(Gaze::Scene { direction: Vec3::NEG_Z }, clip, inverse)
+    }
+
+    fn encoded(view: View) -> Encoded {
+        let foveated = foveated(Some(view));
         let film = FilmOptions::equirect(256, 128);
         foveated.encode(FilmFrame { options: &film, world_from_film: Quat::IDENTITY }, true, None)
     }
@@ -526,6 +532,22 @@ mod tests {
         assert!(share > 0.7 && share < 1.0 && encoded.layers[0].share > 0.0, "{share}");
         assert!((encoded.layers[0].cumulative - 1.0).abs() < 1e-6);
         assert!(encoded.fovea.is_sorted_by_key(|(bound, _)| *bound));
+    }
+
+    /// A clip leaves a layer its beginning: what is said of it is said of that.
+    #[test]
+    fn a_clipped_layer_is_the_beginning_of_the_whole_one() {
+        let view = View::new(Quat::IDENTITY, 40f32.to_radians(), 30f32.to_radians());
+        let (clipped, whole) = (foveated(Some(view)), foveated(None));
+        let reach = clipped.radius_of_interest(&clipped.layers[0].1);
+        assert!((0.1..0.95).contains(&reach), "{reach}");
+        for u in [0.1, 0.5, 0.9] {
+            let ratio = clipped.element_pixels(u) / whole.element_pixels(u * reach);
+            assert!((ratio - 1.0).abs() < 0.02, "{u}: {ratio}");
+        }
+        let film = FilmOptions::equirect(256, 128);
+        let ratio = clipped.peak_share(&film) / whole.peak_share(&film) * f64::from(reach);
+        assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
     }
 
     /// A view whose edge cuts through the disc has no table, nor the words of one.

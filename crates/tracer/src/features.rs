@@ -129,6 +129,12 @@ impl SceneFeatures {
         if present { Self(self.0 | (1 << feature as u32)) } else { self }
     }
 
+    /// The set with the feature left out when `absent`.
+    #[must_use]
+    pub const fn without(self, feature: Feature, absent: bool) -> Self {
+        if absent { Self(self.0 & !(1 << feature as u32)) } else { self }
+    }
+
     /// The features of both sets.
     #[must_use]
     pub const fn union(self, other: Self) -> Self {

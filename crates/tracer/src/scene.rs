@@ -5,7 +5,7 @@
 //! Radiance is linear Rec. 709; punctual lights are in glTF's units (candela, lux) with 1:1 radiometry.
 
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::{collections::HashSet, sync::Arc};
 
 use glam::{Affine3A, DVec3, Quat, Vec2, Vec3, Vec4};
 
@@ -61,6 +61,12 @@ impl Scene {
         let (low, high) =
             corners.flatten().fold((Vec3::MAX, Vec3::MIN), |(low, high), point| (low.min(point), high.max(point)));
         (low.x <= high.x).then_some((low, high))
+    }
+
+    /// The textures, those that several entries share once.
+    pub fn distinct_textures(&self) -> Vec<&Arc<Texture>> {
+        let mut seen = HashSet::new();
+        self.textures.iter().filter(|texture| seen.insert(Arc::as_ptr(texture))).collect()
     }
 
     /// This version with every part that `last` holds in equal form taken from it, so that equal parts are one in memory

@@ -135,9 +135,9 @@ struct Uploader<'a> {
 
 impl Uploader<'_> {
     fn storage<T: bytemuck::NoUninit>(&mut self, what: &'static str, data: &[T]) -> Result<wgpu::Buffer, UploadError> {
-        // A binding must not be empty.
-        const EMPTY: [u8; 128] = [0; 128];
-        let contents: &[u8] = if data.is_empty() { &EMPTY } else { bytemuck::cast_slice(data) };
+        // A binding must hold one element.
+        let empty = vec![0; size_of::<T>().next_multiple_of(16)];
+        let contents: &[u8] = if data.is_empty() { &empty } else { bytemuck::cast_slice(data) };
         let bytes = contents.len() as u64;
         self.check(what, bytes)?;
         self.count_new(bytes);
@@ -240,7 +240,8 @@ impl SceneOnGpu {
         let features = SceneFeatures::of(scene);
         let lobe_tables = cache.lobe_tables(features, &mut uploader);
         let constants = placed.constants(environment.cells_size);
-        let features = features.with(Feature::Lights, !light_table.lights.is_empty());
+        // Lights without power are none.
+        let features = features.without(Feature::Lights, light_table.lights.is_empty());
         let features = features.union(placed.features(cache.hierarchy()));
         let Placed { shapes, placement, tables } = placed;
         let geometry_bytes = tables.bytes();

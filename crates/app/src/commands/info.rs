@@ -27,7 +27,7 @@ fn describe(scene: &Scene, report: &ImportReport) -> Value {
         "meshes": scene.meshes.len(),
         "instances": scene.instances.len(),
         "materials": scene.materials.len(),
-        "textures": scene.textures.iter().map(|t| json!({ "name": t.name, "size": [t.width, t.height] })).collect::<Vec<_>>(),
+        "textures": scene.distinct_textures().iter().map(|t| json!({ "name": t.name, "size": [t.width, t.height] })).collect::<Vec<_>>(),
         "lights": scene.lights.iter().map(|l| json!({ "name": l.name, "kind": kind(&l.kind) })).collect::<Vec<_>>(),
         "emissive_materials": emissive(scene),
         "cameras": scene.cameras.iter().map(|c| json!({ "name": c.name, "position_m": c.position.to_array() })).collect::<Vec<_>>(),
@@ -56,12 +56,13 @@ fn text(scene: &Scene, report: &ImportReport) -> String {
         .collect();
     let lights: Vec<String> =
         scene.lights.iter().map(|light| format!("{} ({})", light.name, kind(&light.kind))).collect();
-    let texels: u64 = scene.textures.iter().map(|t| u64::from(t.width) * u64::from(t.height)).sum();
+    let textures = scene.distinct_textures();
+    let texels: u64 = textures.iter().map(|t| u64::from(t.width) * u64::from(t.height)).sum();
     let rows = [
         ("triangles", session::triangles(scene).to_string()),
         ("meshes", format!("{} in {} places", scene.meshes.len(), scene.instances.len())),
         ("materials", format!("{}, {} of them emissive", scene.materials.len(), emissive(scene))),
-        ("textures", format!("{}, {:.1} Mpixel", scene.textures.len(), texels as f64 * 1e-6)),
+        ("textures", format!("{}, {:.1} Mpixel", textures.len(), texels as f64 * 1e-6)),
         ("lights", list(&lights)),
         ("cameras", list(&cameras)),
         ("environment", environment(scene)),

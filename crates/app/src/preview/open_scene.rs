@@ -40,7 +40,7 @@ impl OpenScene {
         let contents = format!(
             "{} triangles, {} textures{}",
             metric(session::triangles(scene) as f64),
-            scene.textures.len(),
+            scene.distinct_textures().len(),
             if lights == 0 { String::new() } else { format!(", {lights} lights") },
         );
         let (low, high) = scene.bounds().unwrap_or((Vec3::ZERO, Vec3::ONE));

@@ -428,6 +428,9 @@ impl Tracing {
         if let Some(Open { renderer: Some(renderer), .. }) = &mut self.open {
             renderer.set_smoothing(samples);
         }
+        if let Some(side) = &mut self.beside {
+            side.set_smoothing(samples);
+        }
     }
 
     /// Empties the film.

@@ -55,7 +55,7 @@ impl TextureUse {
         }
     }
 
-    /// Uses of an image that give the same texels share one texture.
+    /// Uses of an image that give the same texels, where it can be decoded, share them.
     fn texels_as(self) -> Self {
         match self {
             Self::Emission => Self::Color,
@@ -83,7 +83,7 @@ pub(super) struct TextureTable {
 impl TextureTable {
     /// The index in [`crate::scene::Scene::textures`] that image `image` will have in this use.
     pub(super) fn request(&mut self, image: usize, usage: TextureUse) -> u32 {
-        *self.by_key.entry((image, usage.texels_as())).or_insert_with(|| {
+        *self.by_key.entry((image, usage)).or_insert_with(|| {
             self.requests.push((image, usage));
             u32::try_from(self.requests.len() - 1).expect("a file has fewer than 2^32 textures")
         })
@@ -111,7 +111,7 @@ impl TextureTable {
         let (mut warnings, mut files) = (Vec::new(), Vec::new());
         for (image, (image_textures, image_warnings)) in uses_of_image.iter().zip(decoded) {
             for (&index, texture) in image.1.iter().zip(image_textures) {
-                textures[index] = Some(Arc::new(texture));
+                textures[index] = Some(texture);
             }
             warnings.extend(image_warnings);
             files.extend(data.document.images[image.0].uri.and_then(|uri| folder.companion(uri)));
@@ -125,7 +125,7 @@ impl TextureTable {
         folder: &Folder,
         image: usize,
         uses: &[usize],
-    ) -> Result<(Vec<Texture>, Vec<ImportWarning>), Fault> {
+    ) -> Result<(Vec<Arc<Texture>>, Vec<ImportWarning>), Fault> {
         let source = &data.document.images[image];
         let place = shown_place(source);
         let name = texture_name(source, image);
@@ -144,14 +144,21 @@ impl TextureTable {
         }
         let (width, height) = pixels.as_ref().map_or((1, 1), |p| (p.width, p.height));
         let mut shared = pixels.map(|p| p.texels);
+        let is_decoded = shared.is_some();
+        let mut made: HashMap<TextureUse, Arc<Texture>> = HashMap::new();
         let textures = uses.iter().enumerate().map(|(i, &index)| {
             let usage = self.requests[index].1;
+            if let Some(same) = made.get(&usage.texels_as()).filter(|_| is_decoded) {
+                return Arc::clone(same);
+            }
             let own = if i + 1 == uses.len() { shared.take() } else { shared.clone() };
             let texels = own.map_or_else(|| vec![usage.neutral()], |texels| texels_for(usage, texels));
             let encoding = usage.encoding();
             let header = [width, height, u32::from(encoding == TexelEncoding::Linear)];
             let hash = ContentHash::of(&[bytemuck::bytes_of(&header), bytemuck::cast_slice(&texels)]);
-            Texture { name: name.clone(), width, height, texels, encoding, hash }
+            let texture = Arc::new(Texture { name: name.clone(), width, height, texels, encoding, hash });
+            made.insert(usage.texels_as(), Arc::clone(&texture));
+            texture
         });
         Ok((textures.collect(), warnings))
     }

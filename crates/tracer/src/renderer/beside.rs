@@ -1,10 +1,13 @@
 //! Two films of one scene on one device: the scene and its kernels are there once.
 
+use std::sync::Arc;
+
 use super::{RenderError, Renderer};
 use crate::distribution::Distribution;
 
 impl Renderer {
-    /// A renderer of the same scene from the same place, with the same options, adaptive if this one is, and with a film and a distribution of its own.
+    /// A renderer of the same scene from the same place, with the same options, shaders and smoothing, adaptive if this one is, and with a
+    /// film and a distribution of its own.
     /// Buffers and textures of the scene, and compiled kernels, are shared.
     ///
     /// # Errors
@@ -14,6 +17,8 @@ impl Renderer {
         other.pose = self.pose;
         (other.schedule, other.path_buffers) = (self.schedule, self.path_buffers.clone());
         (other.technique, other.spare_features) = (self.technique, self.spare_features);
+        (other.sources, other.first_sample) = (Arc::clone(&self.sources), self.first_sample);
+        other.view.smoothing_samples = self.view.smoothing_samples;
         other.set_adaptive(self.is_adaptive());
         other.share_scene_of(self)?;
         Ok(other)

@@ -1,6 +1,6 @@
 //! The texel heap: all textures of one encoding as runs of texels in a stack of square pages.
 
-use std::sync::Arc;
+use std::{collections::HashMap, sync::Arc};
 
 use super::{UploadError, pages::Pages};
 use crate::{
@@ -39,11 +39,15 @@ fn stack(
     bytes: &mut u64,
 ) -> Result<wgpu::TextureView, UploadError> {
     let mut total = 0;
-    for (texture, offset) in textures.iter().zip(offsets) {
-        if texture.encoding == encoding {
-            *offset = total as u32;
+    // An image that several slots show is there once.
+    let (mut places, mut distinct) = (HashMap::new(), Vec::new());
+    for (texture, offset) in textures.iter().zip(offsets).filter(|(texture, _)| texture.encoding == encoding) {
+        *offset = *places.entry(texture.hash).or_insert_with(|| {
+            let place = total as u32;
             total += texture.texels.len() as u64;
-        }
+            distinct.push(texture);
+            place
+        });
     }
     let (format, label) = match encoding {
         TexelEncoding::Srgb => (wgpu::TextureFormat::Rgba8UnormSrgb, "sRGB texels"),
@@ -51,6 +55,6 @@ fn stack(
     };
     let pages = Pages::new(gpu, label, format, wgpu::TextureUsages::TEXTURE_BINDING, total)?;
     *bytes += pages.bytes();
-    pages.fill(gpu, textures.iter().filter(|t| t.encoding == encoding).flat_map(|t| t.texels.iter().copied()));
+    pages.fill(gpu, distinct.iter().flat_map(|texture| texture.texels.iter().copied()));
     Ok(pages.view)
 }

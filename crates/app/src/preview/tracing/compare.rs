@@ -52,6 +52,11 @@ impl Side {
         Ok(self.renderer.share_scene_of(first)?)
     }
 
+    /// As [`Renderer::set_smoothing`].
+    pub fn set_smoothing(&mut self, samples: f32) {
+        self.renderer.set_smoothing(samples);
+    }
+
     /// Empties the film.
     pub fn restart(&mut self) {
         self.renderer.restart();
