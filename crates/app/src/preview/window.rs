@@ -15,7 +15,7 @@ use super::compare;
 use super::controls::Controls;
 use super::eccentricity;
 use super::editor::{self, Editor};
-use super::engine::{Engine, Look, Message, Request, State, Survivors};
+use super::engine::{Destination, Engine, Look, Message, Request, State, Survivors};
 use super::gaze::{self, Gaze, ScreenMapping, fovea_ring};
 use super::gaze_control::GazeControl;
 use super::gaze_panel;
@@ -30,7 +30,6 @@ use super::versions::Versions;
 use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
 use crate::cli::values::CameraChoice;
-use crate::output::free_name;
 use crate::preferences::Store;
 use crate::reload::{LoadEvent, Loader};
 use crate::session::{Loaded, Source};
@@ -337,8 +336,8 @@ impl Window {
     fn act(&mut self, action: Action) {
         match action {
             Action::Restart => self.engine.request(Request::Restart),
-            Action::SavePng => self.engine.request(Request::SavePng(self.free_name("png"))),
-            Action::SaveExr => self.engine.request(Request::SaveExr(self.free_name("exr"))),
+            Action::SavePng => self.engine.request(Request::SavePng(self.destination())),
+            Action::SaveExr => self.engine.request(Request::SaveExr(self.destination())),
             Action::Camera(index) => self.jump(index),
             Action::EnterHeadset => self.engine.request(Request::EnterHeadset),
             Action::LeaveHeadset => self.engine.request(Request::LeaveHeadset),
@@ -352,10 +351,10 @@ impl Window {
         }
     }
 
-    /// A name in the working directory that is not taken.
-    fn free_name(&self, extension: &str) -> PathBuf {
+    /// A name in the working directory that is not taken when the file is written.
+    fn destination(&self) -> Destination {
         let scene = self.scene.as_ref().map_or("picture", |(scene, _)| scene.name.as_str());
-        free_name(Path::new(""), scene, extension)
+        Destination::Free { folder: PathBuf::new(), scene: scene.to_owned() }
     }
 
     fn jump(&mut self, index: usize) {
