@@ -12,7 +12,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use fovea_app::cli::choices::{Mode, ToneMapping};
 use fovea_app::cli::{Cli, PreviewArgs};
-use fovea_app::document::edits::{Edit, Part};
+use fovea_app::document::edits::{Edit, EnvironmentEdit, Part};
 use fovea_app::document::parameters::{MaterialParameter, Value};
 use fovea_app::document::{Document, Gesture};
 use fovea_app::gaze::hub::GazeHub;
@@ -98,6 +98,10 @@ fn scene_harness(document: Document, panel: PanelState) -> Harness<'static, Scen
         for action in actions {
             match &action {
                 Action::Edit(edit, gesture) => scene.document.edit(edit, *gesture),
+                Action::LoadEnvironment(path) => {
+                    let edit = EnvironmentEdit { image: Some(path.clone()), ..EnvironmentEdit::default() };
+                    scene.document.edit(&Edit::Environment(edit), Gesture::Once);
+                }
                 Action::Select(part) => scene.panel.selected = *part,
                 Action::Undo => scene.document.undo(),
                 Action::Redo => scene.document.redo(),

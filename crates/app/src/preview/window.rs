@@ -67,9 +67,8 @@ pub struct Window {
     gaze_direction: Option<Vec3>,
     /// What is done with it.
     editor: Option<Editor>,
-    /// The version that the engine has been given, and the environment image that the loader has been asked for.
+    /// The version that the engine has been given.
     given: Option<Arc<Scene>>,
-    asked_environment: Option<PathBuf>,
     camera: usize,
     screenshot: Option<Screenshot>,
     /// A film to go on with once its scene is open.
@@ -110,7 +109,6 @@ impl Window {
             gaze_direction: None,
             editor: None,
             given: None,
-            asked_environment: None,
             camera: 0,
             screenshot,
             resumed: None,
@@ -198,17 +196,14 @@ impl Window {
 
     /// Gives the engine the document's version and asks the loader for what that lacks.
     fn hand_over(&mut self) {
-        let Some(document) = self.editor.as_ref().map(Editor::document) else { return };
-        if !self.given.as_ref().is_some_and(|given| Arc::ptr_eq(given, document.version())) {
-            self.given = Some(Arc::clone(document.version()));
-            self.engine.set_scene(Arc::clone(document.version()));
+        let Some(editor) = &mut self.editor else { return };
+        let version = editor.document().version();
+        if !self.given.as_ref().is_some_and(|given| Arc::ptr_eq(given, version)) {
+            self.given = Some(Arc::clone(version));
+            self.engine.set_scene(Arc::clone(version));
         }
-        let wanted = document.wanted_environment();
-        if wanted != self.asked_environment.as_deref() {
-            self.asked_environment = wanted.map(Path::to_owned);
-            if let Some(path) = wanted {
-                self.loader.load_environment(path.to_owned());
-            }
+        if let Some(path) = editor.ask_for_environment() {
+            self.loader.load_environment(path);
         }
     }
 
