@@ -263,7 +263,9 @@ fn the_settings_can_be_operated_by_keyboard() {
     let cameras = ["front".to_owned(), "above".to_owned()];
     let mut split = SplitTimes::default();
     let mut tools = ToolState { tool: Tool::Brush, ..ToolState::default() };
-    let state = (Controls::from(&args()), Visibility::default(), Vec::new());
+    let mut controls = Controls::from(&args());
+    controls.exposure_ev = 12.5;
+    let state = (controls, Visibility::default(), Vec::new());
     let draw = move |ui: &mut egui::Ui, (controls, visibility, asked): &mut (Controls, Visibility, Vec<_>)| {
         let facts = Facts {
             scene: "room.glb",
@@ -299,6 +301,7 @@ fn the_settings_can_be_operated_by_keyboard() {
         harness.get_by_label(section).click();
         harness.run_steps(10);
     }
+    assert_eq!(harness.state().0.exposure_ev, 12.5, "as the command line asks for it");
     harness.get_by_role_and_label(Role::Slider, "Exposure").set_value_accesskit(1.5);
     harness.get_by_label("Viewport").click();
     harness.run_steps(2);

@@ -79,8 +79,12 @@ impl Window {
         if plain(Key::V) {
             self.act(if in_headset { Action::LeaveHeadset } else { Action::EnterHeadset });
         }
-        let stops = f32::from(u8::from(plain(Key::CloseBracket))) - f32::from(u8::from(plain(Key::OpenBracket)));
-        self.controls.exposure_ev = (self.controls.exposure_ev + 0.5 * stops).clamp(-8.0, 8.0);
+        if plain(Key::CloseBracket) {
+            self.controls.brighten(0.5);
+        }
+        if plain(Key::OpenBracket) {
+            self.controls.brighten(-0.5);
+        }
         if plain(Key::G) {
             self.visibility.gaze = !self.visibility.gaze;
         }
