@@ -107,6 +107,17 @@ fn a_small_study_leaves_all_its_outputs_and_goes_on_from_them() {
     assert_eq!(std::fs::read(&lost).unwrap(), bytes);
     assert_eq!(kept.metadata().unwrap().modified().unwrap(), written);
 
+    // Rates that an interruption left out are measured, the others are left.
+    let path = folder.join("rates.csv");
+    let rates = std::fs::read_to_string(&path).unwrap();
+    let (there, lost): (Vec<&str>, Vec<&str>) = rates.split_inclusive('\n').partition(|row| !row.contains("20_-30"));
+    assert!(!lost.is_empty());
+    std::fs::write(&path, there.concat()).unwrap();
+    study(&folder, "").unwrap();
+    let again = std::fs::read_to_string(&path).unwrap();
+    assert!(again.starts_with(&there.concat()), "{again}");
+    assert_eq!(again.lines().filter(|row| row.contains("20_-30")).count(), lost.len());
+
     // Other settings do not mix with these.
     let refused = study(&folder, "--only curves --background 1,0,0").unwrap_err();
     assert!(refused.contains("other settings"), "{refused}");

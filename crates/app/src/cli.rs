@@ -96,7 +96,7 @@ pub struct PreviewArgs {
     /// Those of [`KEPT_OPTIONS`] that were asked for, rather than left at their defaults.
     #[arg(skip)]
     pub stated: Vec<&'static str>,
-    /// Memory that the film may take, MiB; more gives a finer panorama
+    /// Memory that the film may take, MiB; more gives a finer one
     #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(16..=65536), value_name = "MIB")]
     pub film_memory: u32,
     /// Destroy the graphics device this many seconds after the window opened (for tests)

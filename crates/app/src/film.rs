@@ -7,7 +7,7 @@ use crate::view::View;
 
 /// Panoramas are at least this wide, pixels.
 const SMALLEST_PANORAMA: u32 = 512;
-/// A panorama this many times coarser than the view gives way to a film for the lens.
+/// A film this many times coarser than the view, or than a film for the lens where memory limits that, gives way to one.
 const TOLERABLE_COARSENESS: f32 = 4.0;
 /// A lens film reaches this much farther than the view for which it was made, so that small turns stay on it.
 const LENS_MARGIN: f32 = 1.25;
@@ -27,7 +27,7 @@ impl FilmPlan {
     /// The panorama's width is the next power of two above 360 times the view's pixels per degree, or what fits.
     pub fn new(view: &View, size_px: Vec2, memory_bytes: u64) -> Self {
         let panorama = Self::panorama(view, size_px, memory_bytes, u32::MAX);
-        if panorama.coarseness(view, size_px) <= TOLERABLE_COARSENESS { panorama } else { Self::lens(view, size_px) }
+        if panorama.suits(view, size_px, memory_bytes) { panorama } else { Self::lens(view, size_px, memory_bytes) }
     }
 
     /// The panorama for a view of `size_px` pixels, at most `widest` pixels wide and of at most `memory_bytes`.
@@ -41,9 +41,10 @@ impl FilmPlan {
         Self { options: FilmOptions::equirect(width, width / 2), world_from_film: Quat::IDENTITY }
     }
 
-    /// Whether a view can be shown from this film without another being clearly better.
-    pub fn suits(&self, view: &View, size_px: Vec2) -> bool {
-        self.coarseness(view, size_px) <= TOLERABLE_COARSENESS && self.covers(view)
+    /// Whether a view can be shown from this film without another of at most `memory_bytes` being clearly better.
+    pub fn suits(&self, view: &View, size_px: Vec2, memory_bytes: u64) -> bool {
+        let lens = Self::lens(view, size_px, memory_bytes).coarseness(view, size_px);
+        self.coarseness(view, size_px) <= TOLERABLE_COARSENESS * lens.max(1.0) && self.covers(view)
     }
 
     /// Whether the film reaches to the corners of a view.
@@ -66,9 +67,13 @@ impl FilmPlan {
         pixels_per_radian(view, size_px) / film
     }
 
-    fn lens(view: &View, size_px: Vec2) -> Self {
-        let [width, height] = (size_px * LENS_MARGIN).max(Vec2::ONE).to_array().map(|side| side.ceil() as u32);
+    /// As fine as the view, or as memory allows.
+    fn lens(view: &View, size_px: Vec2, memory_bytes: u64) -> Self {
+        let sides = (size_px * LENS_MARGIN).max(Vec2::ONE).to_array().map(|side| side.ceil() as u32);
         let yfov = 2.0 * (view.tan_half.y * LENS_MARGIN).atan();
+        let wanted_bytes = FilmOptions::perspective(sides[0], sides[1], yfov).bytes();
+        let share = (memory_bytes as f64 / wanted_bytes as f64).sqrt().min(1.0);
+        let [width, height] = sides.map(|side| ((f64::from(side) * share) as u32).max(1));
         Self { options: FilmOptions::perspective(width, height, yfov), world_from_film: view.film_from_view() }
     }
 }
@@ -95,17 +100,36 @@ mod tests {
         let plan = FilmPlan::new(&view(0.0, 90.0), SIZE, MEMORY);
         assert_eq!(plan.options, FilmOptions::equirect(4096, 2048));
         assert_eq!(FilmPlan::new(&view(0.0, 90.0), SIZE, 100 << 20).options, FilmOptions::equirect(2048, 1024));
-        assert_eq!(
-            FilmPlan::new(&view(0.0, 90.0), SIZE, 1).options.mapping,
-            FilmMapping::Perspective { half_extent: [1.25 * 1280.0 / 720.0, 1.25] }
-        );
+        // 16 MiB hold a panorama of 512 pixels, more than four times coarser than a lens film of 800.
+        let plan = FilmPlan::new(&view(0.0, 50.0), SIZE, 16 << 20);
+        assert!(matches!(plan.options.mapping, FilmMapping::Perspective { .. }), "{plan:?}");
+    }
+
+    #[test]
+    fn no_film_of_a_window_is_larger_than_its_memory_or_gives_way_at_once() {
+        for size in [Vec2::new(320.0, 240.0), SIZE, Vec2::new(3840.0, 2160.0), Vec2::new(1080.0, 1920.0)] {
+            for memory in [16 << 20, 21_000_007, MEMORY] {
+                for vfov_deg in [2.0_f32, 8.0, 25.0, 50.0, 65.0, 90.0, 120.0] {
+                    let view = |yaw| View::new(yaw, 0.2, 1.0, vfov_deg.to_radians()).with_aspect(size.x / size.y);
+                    let plan = FilmPlan::new(&view(0.0), size, memory);
+                    assert!(plan.options.bytes() <= memory, "{plan:?}");
+                    let turned = view(0.02 * vfov_deg.to_radians());
+                    assert!(plan.suits(&view(0.0), size, memory) && plan.suits(&turned, size, memory), "{plan:?}");
+                    // What memory there is, is used.
+                    let is_lens = plan.options.mapping != FilmMapping::Equirect;
+                    assert!(
+                        !is_lens || plan.options.height as f32 >= size.y || plan.options.bytes() > memory / 100 * 99
+                    );
+                }
+            }
+        }
     }
 
     #[test]
     fn turning_stays_on_a_panorama_and_zooming_far_leaves_it() {
         let plan = FilmPlan::new(&view(0.0, 50.0), SIZE, MEMORY);
-        assert!(plan.suits(&view(170.0, 50.0), SIZE) && plan.suits(&view(0.0, 20.0), SIZE));
-        assert!(!plan.suits(&view(0.0, 8.0), SIZE));
+        assert!(plan.suits(&view(170.0, 50.0), SIZE, MEMORY) && plan.suits(&view(0.0, 20.0), SIZE, MEMORY));
+        assert!(!plan.suits(&view(0.0, 8.0), SIZE, MEMORY));
     }
 
     #[test]
@@ -113,7 +137,7 @@ mod tests {
         let plan = FilmPlan::new(&view(0.0, 8.0), SIZE, MEMORY);
         assert!(matches!(plan.options.mapping, FilmMapping::Perspective { .. }));
         assert_eq!((plan.options.width, plan.options.height), (1600, 900));
-        assert!(plan.suits(&view(0.0, 8.0), SIZE) && plan.suits(&view(1.0, 8.0), SIZE));
-        assert!(!plan.suits(&view(10.0, 8.0), SIZE) && !plan.suits(&view(0.0, 20.0), SIZE));
+        assert!(plan.suits(&view(0.0, 8.0), SIZE, MEMORY) && plan.suits(&view(1.0, 8.0), SIZE, MEMORY));
+        assert!(!plan.suits(&view(10.0, 8.0), SIZE, MEMORY) && !plan.suits(&view(0.0, 20.0), SIZE, MEMORY));
     }
 }

@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use thiserror::Error;
 
@@ -110,14 +111,15 @@ pub fn free_name(folder: &Path, scene: &str, extension: &str) -> PathBuf {
     (1..).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(0))
 }
 
-/// A name in the same folder that no other process uses.
+/// A name in the same folder that no other write uses, of this process or another.
 fn beside(path: &Path) -> Result<PathBuf, OutputError> {
+    static WRITES: AtomicU64 = AtomicU64::new(0);
     let name = path
         .file_name()
         .ok_or_else(|| OutputError::Unwritable { path: path.to_owned(), reason: "it names no file".into() })?;
     let mut hidden = std::ffi::OsString::from(".");
     hidden.push(name);
-    hidden.push(format!(".{}.part", std::process::id()));
+    hidden.push(format!(".{}-{}.part", std::process::id(), WRITES.fetch_add(1, Ordering::Relaxed)));
     Ok(path.with_file_name(hidden))
 }
 
@@ -156,6 +158,21 @@ mod tests {
         assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 1);
         write_atomically(&path, |writer| writer.write_all(b"new").map_err(|error| error.to_string())).unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "new");
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn writes_of_one_file_at_a_time_do_not_meet() {
+        let folder = scratch("at-a-time");
+        let path = folder.join("image.png");
+        write_atomically(&path, |outer| {
+            write_atomically(&path, |inner| inner.write_all(b"first").map_err(|error| error.to_string()))
+                .map_err(|error| error.to_string())?;
+            outer.write_all(b"second").map_err(|error| error.to_string())
+        })
+        .unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "second");
+        assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 1);
         std::fs::remove_dir_all(folder).unwrap();
     }
 

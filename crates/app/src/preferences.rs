@@ -8,6 +8,7 @@ use egui::ThemePreference;
 use serde_json::{Value, json};
 
 use crate::cli::choices::{Mode, ToneMapping};
+use crate::cli::values::EXPOSURE_EV;
 use crate::config;
 use crate::preview::overlay::Visibility;
 use crate::recent::RecentFiles;
@@ -88,7 +89,7 @@ impl Preferences {
             theme: THEMES.iter().find(|entry| value["theme"] == entry.1).map_or_else(Default::default, |entry| entry.0),
             mode: choice(&value["mode"]),
             adaptive: value["adaptive"].as_bool(),
-            exposure_ev: value["exposure_ev"].as_f64().filter(|ev| (-8.0..=8.0).contains(ev)).map(|ev| ev as f32),
+            exposure_ev: value["exposure_ev"].as_f64().map(|ev| ev as f32).filter(|ev| EXPOSURE_EV.contains(ev)),
             tone_map: choice(&value["tone_map"]),
             denoise: value["denoise"].as_bool(),
             panels: panels.is_object().then(|| Visibility {
@@ -204,7 +205,7 @@ mod tests {
             theme: ThemePreference::Light,
             mode: Some(Mode::VpRegion),
             adaptive: Some(true),
-            exposure_ev: Some(-1.25),
+            exposure_ev: Some(-12.5),
             tone_map: Some(ToneMapping::PbrNeutral),
             denoise: Some(false),
             panels: Some(Visibility { panel: false, editor: true, ring: false, ..Visibility::default() }),

@@ -11,6 +11,8 @@ use tracer::film::FilmPixel;
 mod lost;
 #[path = "films/moving.rs"]
 mod moving;
+#[path = "films/saving.rs"]
+mod saving;
 mod support;
 #[path = "films/tev.rs"]
 mod tev;

@@ -12,7 +12,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use fovea_app::cli::choices::{Mode, ToneMapping};
 use fovea_app::cli::{Cli, PreviewArgs};
-use fovea_app::document::edits::{Edit, Part};
+use fovea_app::document::edits::{Edit, EnvironmentEdit, Part};
 use fovea_app::document::parameters::{MaterialParameter, Value};
 use fovea_app::document::{Document, Gesture};
 use fovea_app::gaze::hub::GazeHub;
@@ -98,6 +98,10 @@ fn scene_harness(document: Document, panel: PanelState) -> Harness<'static, Scen
         for action in actions {
             match &action {
                 Action::Edit(edit, gesture) => scene.document.edit(edit, *gesture),
+                Action::LoadEnvironment(path) => {
+                    let edit = EnvironmentEdit { image: Some(path.clone()), ..EnvironmentEdit::default() };
+                    scene.document.edit(&Edit::Environment(edit), Gesture::Once);
+                }
                 Action::Select(part) => scene.panel.selected = *part,
                 Action::Undo => scene.document.undo(),
                 Action::Redo => scene.document.redo(),
@@ -259,7 +263,9 @@ fn the_settings_can_be_operated_by_keyboard() {
     let cameras = ["front".to_owned(), "above".to_owned()];
     let mut split = SplitTimes::default();
     let mut tools = ToolState { tool: Tool::Brush, ..ToolState::default() };
-    let state = (Controls::from(&args()), Visibility::default(), Vec::new());
+    let mut controls = Controls::from(&args());
+    controls.exposure_ev = 12.5;
+    let state = (controls, Visibility::default(), Vec::new());
     let draw = move |ui: &mut egui::Ui, (controls, visibility, asked): &mut (Controls, Visibility, Vec<_>)| {
         let facts = Facts {
             scene: "room.glb",
@@ -295,6 +301,7 @@ fn the_settings_can_be_operated_by_keyboard() {
         harness.get_by_label(section).click();
         harness.run_steps(10);
     }
+    assert_eq!(harness.state().0.exposure_ev, 12.5, "as the command line asks for it");
     harness.get_by_role_and_label(Role::Slider, "Exposure").set_value_accesskit(1.5);
     harness.get_by_label("Viewport").click();
     harness.run_steps(2);

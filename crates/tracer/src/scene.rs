@@ -4,8 +4,10 @@
 //! point in f64, so that geometry far from the file's origin keeps its precision in f32.
 //! Radiance is linear Rec. 709; punctual lights are in glTF's units (candela, lux) with 1:1 radiometry.
 
-use std::collections::HashMap;
-use std::{collections::HashSet, sync::Arc};
+use std::{
+    collections::{HashMap, HashSet},
+    sync::Arc,
+};
 
 use glam::{Affine3A, DVec3, Quat, Vec2, Vec3, Vec4};
 

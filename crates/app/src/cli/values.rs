@@ -2,6 +2,7 @@
 
 use std::convert::Infallible;
 use std::fmt;
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use crate::view::FOV_RANGE_DEG;
@@ -181,9 +182,12 @@ pub fn unit_interval(text: &str) -> Result<f64, String> {
     if (0.0..=1.0).contains(&value) { Ok(value) } else { Err(format!("{value} is out of range 0..=1")) }
 }
 
+/// Stops by which a picture can be brightened.
+pub const EXPOSURE_EV: RangeInclusive<f32> = -20.0..=20.0;
+
 /// Stops, -20..=20.
 pub fn exposure_ev(text: &str) -> Result<f32, String> {
-    in_range(text, -20.0, 20.0, "EV")
+    in_range(text, *EXPOSURE_EV.start(), *EXPOSURE_EV.end(), "EV")
 }
 
 /// Millimetres from the eye to a screen, 50..=100000.

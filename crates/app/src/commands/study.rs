@@ -50,11 +50,11 @@ pub fn run(args: &StudyArgs) -> anyhow::Result<()> {
 
 fn measure(args: &StudyArgs) -> anyhow::Result<()> {
     let gpu = Gpu::headless(&args.adapter.clone().map_or(AdapterSelect::Auto, AdapterSelect::Named))?;
-    report::write_provenance(args, &gpu)?;
     let scenes: Vec<_> = if args.scenes.is_empty() { vec![None] } else { args.scenes.iter().map(Some).collect() };
     let wants_curves = matches!(args.only, Part::All | Part::Curves);
-    let wants_rates = args.only == Part::Rates || args.only == Part::All && !args.output.join(rates::FILE).exists();
-    let mut rounds = Vec::new();
+    if wants_curves {
+        report::write_provenance(args, &gpu, Part::Curves)?;
+    }
     for scene in scenes {
         let mut bench = Bench::new(&gpu, args, scene)?;
         if wants_curves {
@@ -62,11 +62,8 @@ fn measure(args: &StudyArgs) -> anyhow::Result<()> {
             curves::render_missing(&mut bench, args, &|done| bar.set_position((done * 1000.0) as u64))?;
             bar.finish_and_clear();
         }
-        if wants_rates {
-            rates::measure(&mut bench, args, &mut rounds)?;
-            rates::write(args, &rounds)?;
-        }
         if args.only != Part::Curves {
+            rates::measure(&mut bench, args, &gpu)?;
             figure::write(&mut bench, args, &Rates::read(&args.output)?)?;
         }
     }

@@ -9,6 +9,7 @@ use super::seeing::Seen;
 use crate::attention::Attention;
 use crate::cli::PreviewArgs;
 use crate::cli::choices::{Clip, EccentricityAt, Mode, Switch, ToneMapping};
+use crate::cli::values::EXPOSURE_EV;
 use crate::convergence::Convergence;
 use crate::sampling::Acuity;
 use crate::screen::ScreenGeometry;
@@ -74,6 +75,13 @@ impl From<&PreviewArgs> for Controls {
             paused: false,
             attention: Attention::default(),
         }
+    }
+}
+
+impl Controls {
+    /// Brightens the picture by so many stops, as far as `--exposure` goes.
+    pub fn brighten(&mut self, stops: f32) {
+        self.exposure_ev = (self.exposure_ev + stops).clamp(*EXPOSURE_EV.start(), *EXPOSURE_EV.end());
     }
 }
 
@@ -143,6 +151,8 @@ pub fn clock(elapsed: Duration) -> String {
 
 #[cfg(test)]
 mod tests {
+    use clap::Parser;
+
     use super::*;
 
     #[test]
@@ -159,6 +169,17 @@ mod tests {
         for (seconds, text) in [(4.25, "4.2 s"), (187.0, "3:07"), (3723.9, "1:02:03")] {
             assert_eq!(clock(Duration::from_secs_f64(seconds)), text);
         }
+    }
+
+    #[test]
+    fn the_picture_is_brightened_as_far_as_the_option_goes() {
+        let mut controls = Controls::from(&crate::cli::Cli::parse_from(["fovea", "--exposure", "19.75"]).preview);
+        controls.brighten(-0.5);
+        assert_eq!(controls.exposure_ev, 19.25);
+        (0..3).for_each(|_| controls.brighten(0.5));
+        assert_eq!(controls.exposure_ev, 20.0);
+        (0..100).for_each(|_| controls.brighten(-0.5));
+        assert_eq!(controls.exposure_ev, -20.0);
     }
 
     #[test]

@@ -58,6 +58,8 @@ pub struct Editor {
     outline: Option<(OutlineOf, Vec<Segment>)>,
     sidecar: PathBuf,
     message: Option<Message>,
+    /// The environment image that was last asked for.
+    asked_environment: Option<PathBuf>,
 }
 
 impl Editor {
@@ -92,6 +94,7 @@ impl Editor {
             outline: None,
             message: None,
             sidecar,
+            asked_environment: None,
         }
     }
 
@@ -253,6 +256,7 @@ impl Editor {
             Action::Edit(Edit::Environment(edit), gesture) => self.edit_environment(edit, gesture),
             Action::Edit(edit, gesture) => self.document.edit(&edit, gesture),
             Action::Select(part) => self.select(part),
+            Action::LoadEnvironment(path) => self.set_environment(path),
             Action::Solo(node) => self.document.set_solo(node),
             Action::Undo => self.document.undo(),
             Action::Redo => self.document.redo(),
@@ -267,10 +271,21 @@ impl Editor {
         self.document.edit(&Edit::Environment(edit), gesture);
     }
 
-    /// Lights the scene with an image; what else is known of the environment stays.
+    /// Lights the scene with an image; what else is known of the environment stays. An image that could not be read is tried again.
     pub fn set_environment(&mut self, path: PathBuf) {
+        self.asked_environment = None;
         let edit = EnvironmentEdit { image: Some(path), ..self.document.edits().environment.clone() };
         self.edit_environment(edit, Gesture::Once);
+    }
+
+    /// The environment image that the document lacks, once: a file that cannot be read is not tried at every frame.
+    pub fn ask_for_environment(&mut self) -> Option<PathBuf> {
+        let wanted = self.document.wanted_environment();
+        if wanted == self.asked_environment.as_deref() {
+            return None;
+        }
+        self.asked_environment = wanted.map(Path::to_owned);
+        self.asked_environment.clone()
     }
 
     /// Takes an environment image, or the reason why there is none.
@@ -336,5 +351,37 @@ impl Editor {
             "can_undo": self.document.can_undo(),
             "message": self.message.as_ref().map(|message| message.text.as_str()),
         })
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+    use crate::cli::Cli;
+    use crate::session;
+
+    #[test]
+    fn an_environment_that_failed_is_tried_again_when_it_is_named_again() {
+        let loaded = session::load(&Source::BuiltIn, &Cli::parse_from(["fovea"]).preview.scene).unwrap();
+        let mut editor = Editor::new(&loaded, "unused".into());
+        let path = std::path::absolute("sky.hdr").unwrap();
+        let fails = |editor: &mut Editor| editor.take_environment(path.clone(), Err("no such file".into()));
+        assert_eq!(editor.ask_for_environment(), None);
+        for name in [Action::LoadEnvironment("sky.hdr".into()), Action::LoadEnvironment(path.clone())] {
+            editor.act(name);
+            assert_eq!(editor.ask_for_environment().as_ref(), Some(&path));
+            fails(&mut editor);
+            assert_eq!(editor.ask_for_environment(), None, "not at every frame");
+        }
+        // Another property of the environment is none of the image's.
+        let dimmed = EnvironmentEdit { intensity: Some(0.5), ..editor.document.edits().environment.clone() };
+        editor.act(Action::Edit(Edit::Environment(dimmed), Gesture::GoesOn));
+        assert_eq!(editor.ask_for_environment(), None);
+        // A drop and the dialog.
+        editor.set_environment("sky.hdr".into());
+        assert_eq!(editor.ask_for_environment(), Some(path));
     }
 }

@@ -3,7 +3,6 @@
 //! The window says what it wants to see ([`Engine::look`], the last word counts) and asks for things to be done
 //! ([`Engine::request`], in order). The thread answers with a [`State`] and asks the window to repaint.
 
-use std::path::PathBuf;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender, TryRecvError};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -47,6 +46,8 @@ use motion::{Motion, SEEN_SMOOTHER};
 pub(super) use priority::give_way;
 use rate::Rate;
 pub use readout::{HeadsetReadout, Message, ShownVersion};
+pub use saving::Destination;
+use saving::Saving;
 
 /// How long a thread with nothing to trace sleeps between looks at what the window wants.
 const IDLE: Duration = Duration::from_millis(50);
@@ -78,9 +79,9 @@ pub enum Request {
     /// Empty the film.
     Restart,
     /// Save the picture as it is shown.
-    SavePng(PathBuf),
+    SavePng(Destination),
     /// Save the whole film.
-    SaveExr(PathBuf),
+    SaveExr(Destination),
     /// Go on with a film of the newest version of the scene, or of the first that comes.
     GoOn(Arc<FilmSnapshot>),
     /// Show the scene in the headset; the window shows a mirror.
@@ -145,7 +146,7 @@ pub struct Survivors {
     pub film: Option<Arc<FilmSnapshot>>,
 }
 
-/// Handle of the thread; dropping it stops the thread.
+/// Handle of the thread; dropping it stops the thread, after what was asked for and the film that is being saved.
 pub struct Engine {
     shared: Arc<Shared>,
     devices: Devices,
@@ -154,7 +155,7 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// Starts the thread. `repaint` is called whenever there is something new to show.
+    /// Starts the thread. `repaint` is called whenever there is something new to show, from any thread.
     ///
     /// # Errors
     /// When the system gives no thread.
@@ -162,7 +163,7 @@ impl Engine {
         devices: impl Into<Devices>,
         args: &PreviewArgs,
         gaze: Arc<GazeHub>,
-        repaint: impl Fn() + Send + 'static,
+        repaint: impl Fn() + Send + Sync + 'static,
     ) -> std::io::Result<Self> {
         let devices = devices.into();
         let shared = Arc::new(Shared::default());
@@ -183,7 +184,8 @@ impl Engine {
             versions: 0,
             gaze,
             sample: None,
-            repaint: Box::new(repaint),
+            repaint: Arc::new(repaint),
+            saving: Saving::default(),
             shown: None,
             show_time: Duration::ZERO,
             motion: Motion::default(),
@@ -267,7 +269,8 @@ struct Worker {
     /// The gaze sample that the last batch went by.
     sample: Option<SampleTimes>,
     pacing: Pacing,
-    repaint: Box<dyn Fn() + Send>,
+    repaint: Arc<dyn Fn() + Send + Sync>,
+    saving: Saving,
     shown: Option<Shown>,
     /// How long drawing the picture in full takes.
     show_time: Duration,
@@ -493,14 +496,8 @@ impl Worker {
                 self.toggle_marker();
                 Ok(None)
             }
-            Request::SavePng(path) => {
-                self.busy(Some(format!("saving {}", path.display())));
-                self.save_png(&path).map(|()| Some(format!("saved {}", path.display())))
-            }
-            Request::SaveExr(path) => {
-                self.busy(Some(format!("saving {}", path.display())));
-                self.save_exr(path)
-            }
+            Request::SavePng(to) => self.save_png(to),
+            Request::SaveExr(to) => self.save_exr(to),
             Request::GoOn(film) => {
                 self.take_version();
                 self.go_on(film).map(|()| None)

@@ -29,17 +29,26 @@ const FOLLOW: Duration = Duration::from_millis(50);
 /// Changed millimetres are kept after they have rested so long.
 const RESTED: Duration = Duration::from_secs(2);
 
-/// Where the screen's millimetres come from.
+/// Where millimetres come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ScreenKnown {
+pub enum MmFrom {
     /// The command line.
     Asked,
     /// What was set before, for this screen and person.
     Remembered,
-    /// The monitor's own data; the distance is a guess.
+    /// The monitor's own data.
     Monitor,
     /// Nobody has said.
     Guessed,
+}
+
+/// Where the screen's millimetres come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ScreenFrom {
+    /// Width and height.
+    pub size: MmFrom,
+    /// From the eye to the screen.
+    pub distance: MmFrom,
 }
 
 /// Gaze as the window has it.
@@ -55,7 +64,7 @@ pub struct GazeControl {
     desktop: Option<Desktop>,
     looked: Option<Instant>,
     /// Where the screen's millimetres come from.
-    pub screen_known: ScreenKnown,
+    pub screen_from: ScreenFrom,
     /// The screen as it is kept or was found, and since when it differs from what the panel has.
     kept_screen: Option<ScreenGeometry>,
     changed: Option<(ScreenGeometry, Instant)>,
@@ -80,7 +89,8 @@ impl GazeControl {
                 choices.push(spec);
             }
         });
-        let asked = args.sampling.screen_mm.is_some();
+        let from = |is_asked| if is_asked { MmFrom::Asked } else { MmFrom::Guessed };
+        let (size, distance) = (args.sampling.screen_mm.is_some(), args.sampling.distance_mm.is_some());
         Self {
             hub,
             choices,
@@ -90,7 +100,7 @@ impl GazeControl {
             profile: Profile::default(),
             desktop: None,
             looked: None,
-            screen_known: if asked { ScreenKnown::Asked } else { ScreenKnown::Guessed },
+            screen_from: ScreenFrom { size: from(size), distance: from(distance) },
             kept_screen: None,
             changed: None,
             place: WindowPlace::default(),
@@ -117,11 +127,9 @@ impl GazeControl {
         if !known {
             self.profile = self.profiles.get(&self.person, &desktop.monitor_name);
             self.hub.set_profile(self.profile);
-            if self.screen_known != ScreenKnown::Asked {
-                let size_px = desktop.monitor.size.map(|side| side as u32);
-                (controls.screen, self.screen_known) =
-                    screen(&self.profile, profile::monitor_mm(size_px), controls.screen);
-            }
+            let size_px = desktop.monitor.size.map(|side| side as u32);
+            (controls.screen, self.screen_from) =
+                screen(&self.profile, profile::monitor_mm(size_px), (controls.screen, self.screen_from));
             self.kept_screen = Some(controls.screen);
         }
         self.desktop = Some(desktop);
@@ -146,7 +154,7 @@ impl GazeControl {
     fn accept_screen(&mut self, screen: ScreenGeometry, now: Instant) {
         self.kept_screen = Some(screen);
         self.changed = None;
-        self.screen_known = ScreenKnown::Remembered;
+        self.screen_from = ScreenFrom { size: MmFrom::Remembered, distance: MmFrom::Remembered };
         self.keep(Profile { screen: Some(screen), ..self.profile }, now);
     }
 
@@ -328,13 +336,26 @@ impl GazeControl {
     }
 }
 
-/// Millimetres and distance: what was kept, else what the monitor says, else what is set already.
-fn screen(profile: &Profile, monitor_mm: Option<[f32; 2]>, set: ScreenGeometry) -> (ScreenGeometry, ScreenKnown) {
-    match (profile.screen, monitor_mm) {
-        (Some(screen), _) => (screen, ScreenKnown::Remembered),
-        (None, Some([width_mm, height_mm])) => (ScreenGeometry { width_mm, height_mm, ..set }, ScreenKnown::Monitor),
-        (None, None) => (set, ScreenKnown::Guessed),
-    }
+/// Size and distance, each for itself: what the command line asks for, else what was kept, else what the monitor says, else
+/// what is set already.
+fn screen(
+    profile: &Profile,
+    monitor_mm: Option<[f32; 2]>,
+    (set, from): (ScreenGeometry, ScreenFrom),
+) -> (ScreenGeometry, ScreenFrom) {
+    let set_mm = [set.width_mm, set.height_mm];
+    let ([width_mm, height_mm], size) = match (from.size, profile.screen, monitor_mm) {
+        (MmFrom::Asked, ..) => (set_mm, MmFrom::Asked),
+        (_, Some(kept), _) => ([kept.width_mm, kept.height_mm], MmFrom::Remembered),
+        (_, None, Some(mm)) => (mm, MmFrom::Monitor),
+        (_, None, None) => (set_mm, MmFrom::Guessed),
+    };
+    let (distance_mm, distance) = match (from.distance, profile.screen) {
+        (MmFrom::Asked, _) => (set.distance_mm, MmFrom::Asked),
+        (_, Some(kept)) => (kept.distance_mm, MmFrom::Remembered),
+        (_, None) => (set.distance_mm, MmFrom::Guessed),
+    };
+    (ScreenGeometry { width_mm, height_mm, distance_mm }, ScreenFrom { size, distance })
 }
 
 #[cfg(test)]
@@ -346,9 +367,29 @@ mod tests {
         let set = ScreenGeometry::default();
         let kept = ScreenGeometry { width_mm: 600.0, height_mm: 340.0, distance_mm: 800.0 };
         let profile = Profile { screen: Some(kept), ..Profile::default() };
-        assert_eq!(screen(&profile, Some([1.0, 2.0]), set), (kept, ScreenKnown::Remembered));
-        let (found, known) = screen(&Profile::default(), Some([344.0, 194.0]), set);
-        assert_eq!((found.width_mm, found.distance_mm, known), (344.0, set.distance_mm, ScreenKnown::Monitor));
-        assert_eq!(screen(&Profile::default(), None, set), (set, ScreenKnown::Guessed));
+        let from = |size, distance| ScreenFrom { size, distance };
+        let guessed = (set, from(MmFrom::Guessed, MmFrom::Guessed));
+        let remembered = from(MmFrom::Remembered, MmFrom::Remembered);
+        assert_eq!(screen(&profile, Some([1.0, 2.0]), guessed), (kept, remembered));
+        let (found, known) = screen(&Profile::default(), Some([344.0, 194.0]), guessed);
+        assert_eq!((found.width_mm, found.distance_mm), (344.0, set.distance_mm));
+        assert_eq!(known, from(MmFrom::Monitor, MmFrom::Guessed));
+        assert_eq!(screen(&Profile::default(), None, guessed), guessed);
+    }
+
+    #[test]
+    fn the_command_line_asks_for_size_and_distance_apart() {
+        let kept = ScreenGeometry { width_mm: 600.0, height_mm: 340.0, distance_mm: 800.0 };
+        let profile = Profile { screen: Some(kept), ..Profile::default() };
+        let asked = ScreenGeometry { width_mm: 300.0, height_mm: 200.0, distance_mm: 500.0 };
+        let from = |size, distance| ScreenFrom { size, distance };
+        let (found, known) = screen(&profile, None, (asked, from(MmFrom::Guessed, MmFrom::Asked)));
+        assert_eq!(found, ScreenGeometry { distance_mm: 500.0, ..kept });
+        assert_eq!(known, from(MmFrom::Remembered, MmFrom::Asked));
+        let (found, known) = screen(&profile, Some([1.0, 2.0]), (asked, from(MmFrom::Asked, MmFrom::Guessed)));
+        assert_eq!(found, ScreenGeometry { distance_mm: 800.0, ..asked });
+        assert_eq!(known, from(MmFrom::Asked, MmFrom::Remembered));
+        let both = (asked, from(MmFrom::Asked, MmFrom::Asked));
+        assert_eq!(screen(&profile, Some([1.0, 2.0]), both), both);
     }
 }

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use egui::{Align2, Area, Color32, ComboBox, Context, FontId, Id, Rect, RichText, Ui};
 
-use super::gaze_control::{GazeControl, ScreenKnown};
+use super::gaze_control::{GazeControl, MmFrom};
 use super::navigation::point_in_window;
 use super::theme;
 use crate::gaze::filter::Phase;
@@ -155,10 +155,12 @@ fn setting_up(ui: &mut Ui, gaze: &mut GazeControl, now: Instant) {
 }
 
 fn screen(ui: &mut Ui, gaze: &mut GazeControl, now: Instant) {
-    let text = match gaze.screen_known {
-        ScreenKnown::Asked | ScreenKnown::Remembered => return,
-        ScreenKnown::Monitor => "Screen size from the monitor; the distance is a guess.",
-        ScreenKnown::Guessed => "Screen size and distance are guesses.",
+    let text = match (gaze.screen_from.size, gaze.screen_from.distance) {
+        (MmFrom::Guessed, MmFrom::Guessed) => "Screen size and distance are guesses.",
+        (MmFrom::Guessed, _) => "The screen's size is a guess.",
+        (MmFrom::Monitor, MmFrom::Guessed) => "Screen size from the monitor; the distance is a guess.",
+        (_, MmFrom::Guessed) => "The distance is a guess.",
+        _ => return,
     };
     ui.add(
         egui::Label::new(

@@ -2,7 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use egui::{Align, Align2, Area, ComboBox, Context, DragValue, Grid, Id, Layout, Order, RichText, Slider, Ui};
+use egui::{
+    Align, Align2, Area, ComboBox, Context, DragValue, Grid, Id, Layout, Order, RichText, Slider, SliderClamping, Ui,
+};
 use glam::Vec3;
 
 use super::attention_tools::{self, ToolState};
@@ -14,6 +16,7 @@ use super::seeing;
 use super::split_panel::{self, SplitTimes};
 use super::theme;
 use crate::cli::choices::{Clip, EccentricityAt, Mode, Model};
+use crate::cli::values::EXPOSURE_EV;
 use crate::convergence::Progress;
 use crate::recent::RecentFiles;
 
@@ -258,9 +261,10 @@ const DENOISE_HINT: &str =
 fn picture(ui: &mut Ui, controls: &mut Controls) {
     Grid::new("picture").num_columns(2).min_col_width(72.0).spacing([8.0, 5.0]).show(ui, |ui| {
         let label = ui.label(RichText::new("Exposure").weak());
-        let slider = Slider::new(&mut controls.exposure_ev, -8.0..=8.0).step_by(0.1).fixed_decimals(1).suffix(" EV");
+        let slider = Slider::new(&mut controls.exposure_ev, EXPOSURE_EV).step_by(0.1).fixed_decimals(1).suffix(" EV");
         ui.spacing_mut().slider_width = 84.0;
-        ui.add(slider).labelled_by(label.id);
+        // What the command line asks for stays as it is until somebody changes it.
+        ui.add(slider.clamping(SliderClamping::Edits)).labelled_by(label.id);
         ui.end_row();
 
         let label = ui.label(RichText::new("Tone map").weak());

@@ -200,6 +200,11 @@ impl Tracing {
         self.open.as_ref().and_then(|open| open.plan).map_or(0, |plan| plan.options.bytes())
     }
 
+    /// What a film may take.
+    fn film_memory_bytes(&self) -> u64 {
+        u64::from(self.args.film_memory) << 20
+    }
+
     /// Whether [`Tracing::follow`] will take long: it makes a film and puts the scene on the device.
     pub fn must_prepare(&self, look: &Look) -> bool {
         let plan = self.open.as_ref().and_then(|open| open.plan);
@@ -207,7 +212,9 @@ impl Tracing {
     }
 
     fn is_good(&self, plan: Option<FilmPlan>, view: &View, size_px: Vec2) -> bool {
-        plan.is_some_and(|plan| plan.suits(view, size_px) || self.keeps_film && plan.covers(view))
+        plan.is_some_and(|plan| {
+            plan.suits(view, size_px, self.film_memory_bytes()) || self.keeps_film && plan.covers(view)
+        })
     }
 
     /// Brings film, pose and distribution in line with what the window shows. True when the picture changes at once.
@@ -224,10 +231,9 @@ impl Tracing {
             eccentricity: controls.eccentricity,
             screen_half_extent: mapping.half_size_mm / mapping.screen.distance_mm,
         };
-        let memory = u64::from(self.args.film_memory) << 20;
         let size = size_px.as_vec2();
         if self.must_prepare(look) {
-            let plan = FilmPlan::new(&view, size, memory);
+            let plan = FilmPlan::new(&view, size, self.film_memory_bytes());
             if self.open.as_ref().context("no scene is open")?.plan != Some(plan) {
                 self.set_plan(plan, aim, &inverse)?;
             }
@@ -324,7 +330,7 @@ impl Tracing {
         let plan = self.open.as_ref().context("no scene is open")?.plan;
         let mut changed = false;
         if !plan.is_some_and(fits) {
-            let memory = u64::from(self.args.film_memory) << 20;
+            let memory = self.film_memory_bytes();
             let [hfov, vfov] = view.half_extent.to_array().map(|tangent| 2.0 * tangent.atan());
             let plan = FilmPlan::panorama(&View::new(0.0, 0.0, hfov, vfov), size_px.as_vec2(), memory, widest);
             self.set_plan(plan, aim, &inverse)?;

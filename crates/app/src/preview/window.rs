@@ -15,7 +15,7 @@ use super::compare;
 use super::controls::Controls;
 use super::eccentricity;
 use super::editor::{self, Editor};
-use super::engine::{Engine, Look, Message, Request, State, Survivors};
+use super::engine::{Destination, Engine, Look, Message, Request, State, Survivors};
 use super::gaze::{self, Gaze, ScreenMapping, fovea_ring};
 use super::gaze_control::GazeControl;
 use super::gaze_panel;
@@ -30,7 +30,6 @@ use super::versions::Versions;
 use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
 use crate::cli::values::CameraChoice;
-use crate::output::free_name;
 use crate::preferences::Store;
 use crate::reload::{LoadEvent, Loader};
 use crate::session::{Loaded, Source};
@@ -68,9 +67,8 @@ pub struct Window {
     gaze_direction: Option<Vec3>,
     /// What is done with it.
     editor: Option<Editor>,
-    /// The version that the engine has been given, and the environment image that the loader has been asked for.
+    /// The version that the engine has been given.
     given: Option<Arc<Scene>>,
-    asked_environment: Option<PathBuf>,
     camera: usize,
     screenshot: Option<Screenshot>,
     /// A film to go on with once its scene is open.
@@ -111,7 +109,6 @@ impl Window {
             gaze_direction: None,
             editor: None,
             given: None,
-            asked_environment: None,
             camera: 0,
             screenshot,
             resumed: None,
@@ -199,17 +196,14 @@ impl Window {
 
     /// Gives the engine the document's version and asks the loader for what that lacks.
     fn hand_over(&mut self) {
-        let Some(document) = self.editor.as_ref().map(Editor::document) else { return };
-        if !self.given.as_ref().is_some_and(|given| Arc::ptr_eq(given, document.version())) {
-            self.given = Some(Arc::clone(document.version()));
-            self.engine.set_scene(Arc::clone(document.version()));
+        let Some(editor) = &mut self.editor else { return };
+        let version = editor.document().version();
+        if !self.given.as_ref().is_some_and(|given| Arc::ptr_eq(given, version)) {
+            self.given = Some(Arc::clone(version));
+            self.engine.set_scene(Arc::clone(version));
         }
-        let wanted = document.wanted_environment();
-        if wanted != self.asked_environment.as_deref() {
-            self.asked_environment = wanted.map(Path::to_owned);
-            if let Some(path) = wanted {
-                self.loader.load_environment(path.to_owned());
-            }
+        if let Some(path) = editor.ask_for_environment() {
+            self.loader.load_environment(path);
         }
     }
 
@@ -337,8 +331,8 @@ impl Window {
     fn act(&mut self, action: Action) {
         match action {
             Action::Restart => self.engine.request(Request::Restart),
-            Action::SavePng => self.engine.request(Request::SavePng(self.free_name("png"))),
-            Action::SaveExr => self.engine.request(Request::SaveExr(self.free_name("exr"))),
+            Action::SavePng => self.engine.request(Request::SavePng(self.destination())),
+            Action::SaveExr => self.engine.request(Request::SaveExr(self.destination())),
             Action::Camera(index) => self.jump(index),
             Action::EnterHeadset => self.engine.request(Request::EnterHeadset),
             Action::LeaveHeadset => self.engine.request(Request::LeaveHeadset),
@@ -352,10 +346,10 @@ impl Window {
         }
     }
 
-    /// A name in the working directory that is not taken.
-    fn free_name(&self, extension: &str) -> PathBuf {
+    /// A name in the working directory that is not taken when the file is written.
+    fn destination(&self) -> Destination {
         let scene = self.scene.as_ref().map_or("picture", |(scene, _)| scene.name.as_str());
-        free_name(Path::new(""), scene, extension)
+        Destination::Free { folder: PathBuf::new(), scene: scene.to_owned() }
     }
 
     fn jump(&mut self, index: usize) {

@@ -21,20 +21,20 @@ use tracer::scene::Scene;
 
 use crate::support::Folder;
 
-fn args(line: &str) -> PreviewArgs {
+pub fn args(line: &str) -> PreviewArgs {
     cli::parse(line.split_whitespace().map(OsString::from)).unwrap().preview
 }
 
-fn gpu() -> Gpu {
+pub fn gpu() -> Gpu {
     Gpu::headless(&AdapterSelect::Auto).unwrap()
 }
 
-fn scene(folder: &Folder, args: &PreviewArgs) -> Arc<Scene> {
+pub fn scene(folder: &Folder, args: &PreviewArgs) -> Arc<Scene> {
     session::load(&Source::File(folder.path("square.gltf")), &args.scene).unwrap().scene
 }
 
 /// A window of 160x90 pixels at the scene's camera.
-fn look(scene: &Scene, args: &PreviewArgs) -> Look {
+pub fn look(scene: &Scene, args: &PreviewArgs) -> Look {
     let camera = &session::viewpoints(scene)[0];
     let controls = Controls::from(args);
     let rect = Rect::from_min_max(pos2(0.0, 0.0), pos2(160.0, 90.0));
@@ -44,7 +44,7 @@ fn look(scene: &Scene, args: &PreviewArgs) -> Look {
     Look { standpoint: navigation.standpoint, gaze: Gaze::default(), controls, mapping, size_px, pointer: None }
 }
 
-const LINE: &str = "fovea --mode od --seed 3 --max-bounces 2 --film-memory 16 --background 0.5,0.75,1";
+pub const LINE: &str = "fovea --mode od --seed 3 --max-bounces 2 --film-memory 16 --background 0.5,0.75,1";
 
 #[test]
 fn a_film_goes_on_over_another_device_to_the_same_bytes() {
@@ -86,7 +86,7 @@ fn a_film_goes_on_over_another_device_to_the_same_bytes() {
 }
 
 /// Waits for a state; panics after a minute.
-fn wait_for(engine: &Engine, what: &str, mut arrived: impl FnMut(&State) -> bool) -> State {
+pub fn wait_for(engine: &Engine, what: &str, mut arrived: impl FnMut(&State) -> bool) -> State {
     let start = Instant::now();
     loop {
         let state = engine.state();

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use fovea_app::cli::choices::{Geometry, Model};
 use fovea_app::gaze::filter::Phase;
-use fovea_app::preview::engine::{Request, State};
+use fovea_app::preview::engine::{Destination, Request, State};
 use fovea_app::readback;
 use fovea_app::sampling::Acuity;
 use fovea_app::view::{direction, yaw_pitch};
@@ -272,7 +272,7 @@ fn samples_gather_where_the_eyes_look() {
     let state = preview.wait("samples", |state| state.readout.samples > 60_000);
     eprintln!("{:?}", state.headset.unwrap());
     let path = std::path::PathBuf::from(std::env::var_os("XDG_RUNTIME_DIR").unwrap()).join("film.exr");
-    preview.engine.request(Request::SaveExr(path.clone()));
+    preview.engine.request(Request::SaveExr(Destination::File(path.clone())));
     preview.wait("a file", |state| state.message.as_ref().is_some_and(|message| message.text.starts_with("saved")));
     let (film, counts) = crate::gaze::samples_of(&path);
     let (towards, peak, density) = crate::gaze::peak(&film, &counts);

@@ -48,7 +48,7 @@ impl Sheet {
 /// Renders and writes `figure-SCENE.png` at the scene's first gaze; what is there is left.
 ///
 /// # Errors
-/// When the device is lost or the file cannot be written.
+/// When a rate was not measured, the device is lost or the file cannot be written.
 pub fn write(bench: &mut Bench, args: &StudyArgs, rates: &Rates) -> anyhow::Result<()> {
     let path = args.output.join(format!("figure-{}.png", bench.name));
     if path.exists() {
@@ -60,8 +60,8 @@ pub fn write(bench: &mut Bench, args: &StudyArgs, rates: &Rates) -> anyhow::Resu
     let width = film.width as usize + side + MAGNIFIED * zoom + 2 * GAP;
     let mut sheet = Sheet::new(width, METHODS.len() * (side + GAP) - GAP);
     for (row, method) in METHODS.into_iter().enumerate() {
-        let cost = |method| rates.of(&bench.name, &place.name(), method).map_or(1.0, |cost| cost.wall);
-        let samples = OD_SPP * film.pixels() as f64 * cost(Method::Od) / cost(method);
+        let of_od = (Method::Od, OD_SPP * film.pixels() as f64);
+        let samples = rates.in_equal_time((&bench.name, &place.name()), of_od, method)?;
         bench.begin(method, &place, 1, SequenceKind::Independent)?;
         bench.go_on((samples as u64).max(1))?;
         let top = row * (side + GAP);

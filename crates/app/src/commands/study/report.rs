@@ -15,21 +15,17 @@ use crate::cli::study::{Part, StudyArgs};
 /// Where and with what the parts were measured.
 const PROVENANCE: &str = "provenance.json";
 
-/// Notes where a part of the study is measured; for curves, where the first of them were.
+/// Notes where a part of the study is measured: curves or rates; for curves, where the first of them were.
 ///
 /// # Errors
 /// When the file cannot be written.
-pub fn write_provenance(args: &StudyArgs, gpu: &Gpu) -> anyhow::Result<()> {
+pub fn write_provenance(args: &StudyArgs, gpu: &Gpu, part: Part) -> anyhow::Result<()> {
     let here: Value = Provenance::on(gpu).fields().into_iter().map(|(name, value)| (name, value.to_owned())).collect();
     let mut all = read_provenance(args);
-    for (part, measured) in [
-        ("curves", matches!(args.only, Part::All | Part::Curves)),
-        ("rates", args.only == Part::Rates || args.only == Part::All && !args.output.join(super::rates::FILE).exists()),
-    ] {
-        if measured && (part == "rates" || all[part].is_null()) {
-            all[part] = here.clone();
-            all[part]["command"] = command().into();
-        }
+    let name = if part == Part::Rates { "rates" } else { "curves" };
+    if part == Part::Rates || all[name].is_null() {
+        all[name] = here;
+        all[name]["command"] = command().into();
     }
     super::write_text(&args.output.join(PROVENANCE), &format!("{all:#}\n"))
 }

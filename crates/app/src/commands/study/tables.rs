@@ -248,11 +248,10 @@ pub fn geometric_percent(analysis: &Analysis, method: Method, split: Split) -> [
     [statistics::geometric_mean(ours), statistics::geometric_mean(theirs)]
 }
 
-/// Samples of a method in the time that FV's curve takes at a scene's first gaze.
+/// Samples of a method in the time that FV's curve takes at a scene's first gaze; `None` where a rate is missing.
 pub fn samples_in_equal_time(analysis: &Analysis, sight: Sight<'_>, method: Method) -> Option<f64> {
     let end = *analysis.curve(sight, Method::Fv, "film_sphere")?.samples.last()?;
-    let cost = |method| analysis.rates.of(sight.scene, sight.gaze, method).map_or(1.0, |cost| cost.wall);
-    Some(end * cost(Method::Fv) / cost(method))
+    analysis.rates.in_equal_time((sight.scene, sight.gaze), (Method::Fv, end), method).ok()
 }
 
 /// A method's film error by ring in the time that FV's curve takes.
@@ -314,10 +313,9 @@ pub fn pictures(analysis: &Analysis) -> String {
         let Some(od) = analysis.curve(sight, Method::Od, "empty") else { continue };
         // A quarter of OD's curve: all have something to show and none is done.
         let end = od.samples.last().copied().unwrap_or(0.0) / 4.0;
-        let cost = |method| analysis.rates.of(sight.scene, sight.gaze, method).map_or(1.0, |cost| cost.wall);
         for method in [Method::Od, Method::Vp, Method::VpRegion, Method::Fv, Method::FvBest] {
-            let samples = end * cost(Method::Od) / cost(method);
-            let at = |measure: &str| statistics::within_curve(&analysis.curve(sight, method, measure)?, samples);
+            let samples = analysis.rates.in_equal_time((sight.scene, sight.gaze), (Method::Od, end), method).ok();
+            let at = |measure: &str| statistics::within_curve(&analysis.curve(sight, method, measure)?, samples?);
             table.row(&[
                 scene.to_owned(),
                 method.name().to_owned(),

@@ -3,6 +3,7 @@
 //! A function of the document and of what the panel remembers; what a person asks for comes back as [`Action`]s.
 
 use std::collections::HashMap;
+use std::path::PathBuf;
 
 use egui::{Align2, Area, Context, Id, Response, RichText, ScrollArea, TextEdit, Ui, WidgetInfo, accesskit};
 
@@ -60,6 +61,8 @@ pub struct PanelState {
 pub enum Action {
     /// Change the scene.
     Edit(Edit, Gesture),
+    /// Light the scene with an image.
+    LoadEnvironment(PathBuf),
     /// Select this, or nothing.
     Select(Option<Part>),
     /// Show a node alone, or all.

@@ -278,7 +278,6 @@ fn show_light(ui: &mut Ui, document: &Document, index: u32, actions: &mut Vec<Ac
 
 fn show_environment(ui: &mut Ui, document: &Document, state: &mut PanelState, actions: &mut Vec<Action>) {
     let edit = document.edits().environment.clone();
-    let mut set = |edit: EnvironmentEdit, gesture| actions.push(Action::Edit(Edit::Environment(edit), gesture));
     ui.horizontal(|ui| {
         let label = ui.label(RichText::new("Image").weak());
         let field =
@@ -288,10 +287,10 @@ fn show_environment(ui: &mut Ui, document: &Document, state: &mut PanelState, ac
         if (ui.button("Load").on_hover_text("Or drop the file on the window").clicked() || entered)
             && !state.environment.trim().is_empty()
         {
-            let image = Some(state.environment.trim().into());
-            set(EnvironmentEdit { image, ..edit.clone() }, Gesture::Once);
+            actions.push(Action::LoadEnvironment(state.environment.trim().into()));
         }
     });
+    let mut set = |edit: EnvironmentEdit, gesture| actions.push(Action::Edit(Edit::Environment(edit), gesture));
     Grid::new("environment").num_columns(2).spacing([8.0, 4.0]).show(ui, |ui| match &document.version().environment {
         Environment::Constant(radiance) => {
             let label = ui.label(RichText::new("Radiance").weak());

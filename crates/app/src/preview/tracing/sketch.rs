@@ -20,9 +20,8 @@ impl Tracing {
         let coarseness = if self.gpu.is_software() { COARSENESS } else { 1 };
         let size = self.picture_size(look, coarseness);
         let picture = self.target(size)?;
+        let plan = FilmPlan::new(&look.standpoint.view, look.size_px.as_vec2(), self.film_memory_bytes());
         let open = self.open.as_mut().context("no scene is open")?;
-        let memory = u64::from(self.args.film_memory) << 20;
-        let plan = FilmPlan::new(&look.standpoint.view, look.size_px.as_vec2(), memory);
         let everywhere = Distribution::omnidirectional(inverse);
         let renderer = Renderer::new(&self.gpu, &renderer_options(&self.args, plan), everywhere)?;
         let (renderer, _) = open.sketched.insert((renderer, plan));

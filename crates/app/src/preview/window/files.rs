@@ -16,7 +16,7 @@ use crate::preferences::{Preferences, Store, WindowPlace};
 use crate::preview::background::Background;
 use crate::preview::controls::Controls;
 use crate::preview::dialogs::{Answer, Dialogs, Purpose};
-use crate::preview::engine::{Message, Request};
+use crate::preview::engine::{Destination, Message, Request};
 use crate::preview::overlay::Visibility;
 use crate::preview::{file_menu, place};
 use crate::recent::RecentFiles;
@@ -166,8 +166,8 @@ impl Window {
                     self.note = Some(Message::now(error.to_string(), true));
                 }
             }
-            Purpose::SavePicture => self.engine.request(Request::SavePng(path)),
-            Purpose::SaveFilm => self.engine.request(Request::SaveExr(path)),
+            Purpose::SavePicture => self.engine.request(Request::SavePng(Destination::File(path))),
+            Purpose::SaveFilm => self.engine.request(Request::SaveExr(Destination::File(path))),
             Purpose::SaveEdits => {
                 if let Some(editor) = &mut self.editor {
                     editor.save_as(&path);

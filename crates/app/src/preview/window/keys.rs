@@ -1,6 +1,6 @@
 //! What the window's keys do.
 
-use egui::{Context, Key, Modifiers};
+use egui::{Context, Event, InputState, Key, Modifiers};
 
 use super::Window;
 use crate::preview::dialogs::Purpose;
@@ -24,6 +24,7 @@ impl Window {
         const NUMBERS: [Key; 9] =
             [Key::Num1, Key::Num2, Key::Num3, Key::Num4, Key::Num5, Key::Num6, Key::Num7, Key::Num8, Key::Num9];
         let pressed = |modifiers, key| ctx.input_mut(|input| input.consume_key(modifiers, key));
+        let saves = |modifiers, key| ctx.input_mut(|input| consume_press(input, modifiers, key));
         if let Some(editor) = &mut self.editor {
             // Several may come in one frame where frames are long.
             let count = |modifiers, key| ctx.input_mut(|input| input.count_and_consume_key(modifiers, key));
@@ -31,7 +32,7 @@ impl Window {
             let undo = count(Modifiers::COMMAND, Key::Z);
             (0..undo).for_each(|_| editor.act(editor::panel::Action::Undo));
             (0..redo).for_each(|_| editor.act(editor::panel::Action::Redo));
-            if pressed(Modifiers::COMMAND, Key::E) {
+            if saves(Modifiers::COMMAND, Key::E) {
                 editor.act(editor::panel::Action::Save);
             }
             if pressed(Modifiers::COMMAND, Key::H) {
@@ -48,8 +49,8 @@ impl Window {
             }
         }
         seeing::keys(ctx, &mut self.controls);
-        let exr = pressed(Modifiers::COMMAND | Modifiers::SHIFT, Key::S);
-        let png = pressed(Modifiers::COMMAND, Key::S);
+        let exr = saves(Modifiers::COMMAND | Modifiers::SHIFT, Key::S);
+        let png = saves(Modifiers::COMMAND, Key::S);
         let plain = |key| pressed(Modifiers::NONE, key);
         let camera = NUMBERS.iter().position(|key| plain(*key)).or_else(|| plain(Key::Home).then_some(self.camera));
         let restart = plain(Key::R);
@@ -78,8 +79,12 @@ impl Window {
         if plain(Key::V) {
             self.act(if in_headset { Action::LeaveHeadset } else { Action::EnterHeadset });
         }
-        let stops = f32::from(u8::from(plain(Key::CloseBracket))) - f32::from(u8::from(plain(Key::OpenBracket)));
-        self.controls.exposure_ev = (self.controls.exposure_ev + 0.5 * stops).clamp(-8.0, 8.0);
+        if plain(Key::CloseBracket) {
+            self.controls.brighten(0.5);
+        }
+        if plain(Key::OpenBracket) {
+            self.controls.brighten(-0.5);
+        }
         if plain(Key::G) {
             self.visibility.gaze = !self.visibility.gaze;
         }
@@ -112,5 +117,37 @@ impl Window {
         if let Some(index) = camera {
             self.jump(index);
         }
+    }
+}
+
+/// As [`InputState::consume_key`], but a key that is held down counts once: each file wants a press of its own.
+fn consume_press(input: &mut InputState, modifiers: Modifiers, key: Key) -> bool {
+    let repeats = |event: &Event| {
+        matches!(event, Event::Key { key: other, repeat: true, modifiers: held, .. }
+            if *other == key && held.matches_logically(modifiers))
+    };
+    input.events.retain(|event| !repeats(event));
+    input.consume_key(modifiers, key)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_key_that_is_held_down_saves_once() {
+        let ctx = Context::default();
+        let mut saves = |pressed: bool| {
+            let key = Key::S;
+            let event = Event::Key { key, physical_key: None, pressed, repeat: false, modifiers: Modifiers::COMMAND };
+            let mut saves = false;
+            let input = egui::RawInput { events: vec![event], ..egui::RawInput::default() };
+            let mut output = ctx.run_ui(input, |ui| {
+                saves |= ui.input_mut(|input| consume_press(input, Modifiers::COMMAND, Key::S));
+            });
+            output.textures_delta.clear();
+            saves
+        };
+        assert_eq!([true, true, true, false, true].map(&mut saves), [true, false, false, false, true]);
     }
 }
