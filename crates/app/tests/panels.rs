@@ -31,6 +31,9 @@ use fovea_app::session::{self, Source};
 use tracer::scene::Backdrop;
 use tracer::view::{DebugScale, DebugView, Histogram};
 
+#[path = "panels/properties.rs"]
+mod properties;
+
 fn args() -> PreviewArgs {
     Cli::parse_from(["fovea"]).preview
 }

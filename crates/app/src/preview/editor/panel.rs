@@ -94,9 +94,14 @@ pub fn panel(
             ui.separator();
             let left = (height - ui.min_rect().height() - 24.0).max(80.0);
             let area = ScrollArea::vertical().id_salt("properties").max_height(left).min_scrolled_height(left);
-            area.auto_shrink([false, true]).show(ui, |ui| properties::show(ui, document, part, state, actions));
+            area.auto_shrink([false, true]).show(ui, |ui| {
+                // What is typed for one part must not count for the next that is selected.
+                ui.push_id(part, |ui| properties::show(ui, document, part, state, actions));
+            });
         });
     });
+    // A click may end typing: what was typed comes before what the click asks for.
+    actions.sort_by_key(|action| !matches!(action, Action::Edit(edit, _) if !matches!(edit, Edit::Reset(_))));
 }
 
 fn history(ui: &mut Ui, document: &Document, actions: &mut Vec<Action>) {

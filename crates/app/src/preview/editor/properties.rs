@@ -1,6 +1,8 @@
 //! The properties of what is selected, as fields, sliders and colours.
 
-use egui::{DragValue, Grid, Response, RichText, Slider, Ui};
+use std::ops::RangeInclusive;
+
+use egui::{DragValue, Grid, Response, RichText, Slider, SliderClamping, Ui};
 use glam::{Affine3A, EulerRot, Mat3A, Quat, Vec3};
 use tracer::scene::{Backdrop, Environment, PunctualKind};
 
@@ -54,6 +56,16 @@ fn gesture(response: &Response) -> Gesture {
     if response.dragged() || response.is_pointer_button_down_on() { Gesture::GoesOn } else { Gesture::Once }
 }
 
+/// A field for a number. What is typed counts when it is done: half a number is another one.
+fn number_field(value: &mut f32) -> DragValue<'_> {
+    DragValue::new(value).update_while_editing(false)
+}
+
+/// A slider with such a field. What the file says is shown as it is, also outside of the slider's range.
+fn number_slider(value: &mut f32, range: RangeInclusive<f32>) -> Slider<'_> {
+    Slider::new(value, range).update_while_editing(false).clamping(SliderClamping::Edits)
+}
+
 fn show_node(ui: &mut Ui, document: &Document, node: u32, state: &mut PanelState, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
@@ -74,7 +86,7 @@ fn show_node(ui: &mut Ui, document: &Document, node: u32, state: &mut PanelState
             ui.label(RichText::new(name).weak());
             for axis in 0..3 {
                 let mut value = place.get(kind)[axis];
-                let field = DragValue::new(&mut value).speed(speed).max_decimals(decimals).suffix(suffix);
+                let field = number_field(&mut value).speed(speed).max_decimals(decimals).suffix(suffix);
                 let response = ui.add_sized([58.0, 20.0], field);
                 name_field(&response, format!("{name} {}", AXES[axis]));
                 if response.changed() {
@@ -203,7 +215,7 @@ fn number_row(
     mut number: f32,
 ) -> Option<(Value, Gesture)> {
     ui.spacing_mut().slider_width = 84.0;
-    let response = ui.add(Slider::new(&mut number, parameter.range()).max_decimals(3)).labelled_by(label.id);
+    let response = ui.add(number_slider(&mut number, parameter.range()).max_decimals(3)).labelled_by(label.id);
     response.changed().then(|| (Value::Number(number), gesture(&response)))
 }
 
@@ -219,7 +231,7 @@ fn strong_color(ui: &mut Ui, label: &Response, value: Vec3) -> Option<(Vec3, Ges
             edited = Some((Vec3::from_array(rgb) * strength, Gesture::GoesOn));
         }
         let speed = f64::from(strength.max(0.1)) * 0.01;
-        let response = ui.add(DragValue::new(&mut strength).range(0.0..=1e6).speed(speed).max_decimals(3));
+        let response = ui.add(number_field(&mut strength).range(0.0..=1e6).speed(speed).max_decimals(3));
         name_field(&response, "Strength".into());
         if response.changed() {
             edited = Some((color * strength, gesture(&response)));
@@ -250,7 +262,7 @@ fn show_light(ui: &mut Ui, document: &Document, index: u32, actions: &mut Vec<Ac
             let label = ui.label(RichText::new(name).weak());
             let mut degrees = angle.to_degrees();
             ui.spacing_mut().slider_width = 84.0;
-            let response = ui.add(Slider::new(&mut degrees, range).suffix(" °").max_decimals(2)).labelled_by(label.id);
+            let response = ui.add(number_slider(&mut degrees, range).suffix(" °").max_decimals(2)).labelled_by(label.id);
             if response.changed() {
                 set(LightEdit { angle: Some(degrees.to_radians()), ..edit }, gesture(&response));
             }
@@ -261,7 +273,7 @@ fn show_light(ui: &mut Ui, document: &Document, index: u32, actions: &mut Vec<Ac
             ui.horizontal(|ui| {
                 for axis in 0..3 {
                     let mut value = light.position[axis];
-                    let field = DragValue::new(&mut value).speed(0.01).max_decimals(3).suffix(" m");
+                    let field = number_field(&mut value).speed(0.01).max_decimals(3).suffix(" m");
                     let response = ui.add_sized([54.0, 20.0], field);
                     name_field(&response, format!("Location {}", AXES[axis]));
                     if response.changed() {
@@ -304,7 +316,7 @@ fn show_environment(ui: &mut Ui, document: &Document, state: &mut PanelState, ac
             ui.spacing_mut().slider_width = 84.0;
             let label = ui.label(RichText::new("Rotation").weak());
             let mut degrees = *rotation_deg;
-            let slider = Slider::new(&mut degrees, -180.0..=180.0).suffix(" °").max_decimals(1);
+            let slider = number_slider(&mut degrees, -180.0..=180.0).suffix(" °").max_decimals(1);
             let response = ui.add(slider).labelled_by(label.id);
             if response.changed() {
                 set(EnvironmentEdit { rotation_deg: Some(degrees), ..edit.clone() }, gesture(&response));
@@ -312,7 +324,7 @@ fn show_environment(ui: &mut Ui, document: &Document, state: &mut PanelState, ac
             ui.end_row();
             let label = ui.label(RichText::new("Intensity").weak());
             let mut factor = *intensity;
-            let slider = Slider::new(&mut factor, 0.0..=100.0).logarithmic(true).max_decimals(3);
+            let slider = number_slider(&mut factor, 0.0..=100.0).logarithmic(true).max_decimals(3);
             let response = ui.add(slider).labelled_by(label.id);
             if response.changed() {
                 set(EnvironmentEdit { intensity: Some(factor), ..edit.clone() }, gesture(&response));
