@@ -1,7 +1,7 @@
 //! Fields of the properties, with real typing and dragging.
 
 use egui::{Event, Key, Modifiers};
-use fovea_app::preview::editor::Editor;
+use fovea_app::preview::editor::{Editor, properties};
 use fovea_app::preview::navigation::Standpoint;
 use fovea_app::view::View;
 use glam::{Quat, Vec3};
@@ -129,4 +129,56 @@ fn a_press_in_the_picture_ends_typing_before_something_else_is_selected() {
     let editor = harness.state();
     assert_eq!(editor.panel.selected, None);
     assert_eq!(editor.document().edits().nodes[&node].moved.scale.x, 3.0);
+}
+
+#[test]
+fn an_angle_is_dragged_past_ninety_degrees_and_the_others_stay() {
+    let (mut harness, node) = with_object();
+    let angles = |harness: &Harness<'_, Scene>| ["X", "Y", "Z"].map(|axis| shown(harness, &format!("Rotation {axis}")));
+    let at_first = angles(&harness);
+    let axes = |harness: &Harness<'_, Scene>| properties::own_axes(&harness.state().document, node).1;
+    let axes_at_first = axes(&harness);
+    let start = harness.get_by_label("Rotation Y").rect().center();
+    harness.hover_at(start);
+    harness.drag_at(start);
+    harness.run_steps(2);
+    for step in 1..=16 {
+        harness.hover_at(start + egui::vec2(0.0, -20.0 * step as f32));
+        harness.run_steps(2);
+        let [x, y, z] = angles(&harness);
+        assert_eq!([x, z], [at_first[0], at_first[2]], "at {y}");
+        // Half a degree a point; round numbers are preferred.
+        assert!((y - at_first[1] - 10.0 * f64::from(step)).abs() < 6.0, "{y} after {step} steps from {at_first:?}");
+    }
+    let dragged = angles(&harness);
+    assert!(dragged[1] - at_first[1] > 150.0, "{dragged:?}");
+    // The object follows: about Y of a rotation without Z, the world's Y.
+    assert_eq!([at_first[0], at_first[2]], [0.0, 0.0], "the object lies along the world's axes");
+    let turned = glam::Mat3A::from_rotation_y((dragged[1] - at_first[1]).to_radians() as f32) * axes_at_first;
+    assert!(axes(&harness).abs_diff_eq(turned, 1e-4), "{dragged:?}");
+    harness.drop_at(start - egui::vec2(0.0, 320.0));
+    harness.run_steps(3);
+    let [x, y, z] = angles(&harness);
+    assert!((x.abs() - 180.0).abs() < 0.1 && y.abs() < 90.0 && (z.abs() - 180.0).abs() < 0.1, "{x} {y} {z}");
+    assert!(axes(&harness).abs_diff_eq(turned, 1e-4));
+}
+
+#[test]
+fn held_angles_give_way_to_a_rotation_from_elsewhere() {
+    let (mut harness, node) = with_object();
+    let at = harness.get_by_label("Rotation Y").rect().center();
+    write_at(&mut harness, at, "");
+    // Steps of half a degree, while the field is open.
+    (0..3).for_each(|_| press(&mut harness, Key::ArrowUp));
+    let before = shown(&harness, "Rotation Y");
+    assert!(before != 0.0);
+    let turned = Quat::from_rotation_y(0.5);
+    let moved = fovea_app::document::edits::Move { rotation: turned, ..Default::default() };
+    harness.state_mut().document.edit(&Edit::Move(node, moved), Gesture::Once);
+    harness.run_steps(3);
+    assert!(harness.state().panel.angles.is_some(), "the field is still open");
+    let expected = properties::own_axes(&harness.state().document, node).1;
+    let angles = ["X", "Y", "Z"].map(|axis| shown(&harness, &format!("Rotation {axis}")).to_radians() as f32);
+    let found = Quat::from_euler(glam::EulerRot::ZYX, angles[2], angles[1], angles[0]);
+    assert!(glam::Mat3A::from_quat(found).abs_diff_eq(expected, 1e-3), "{angles:?}");
 }

@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use egui::{Align2, Area, Context, Id, Response, RichText, ScrollArea, TextEdit, Ui, WidgetInfo, accesskit};
 
 use super::gizmo::GizmoMode;
-use super::properties;
+use super::properties::{self, HeldAngles};
 use crate::document::edits::{Edit, Part};
 use crate::document::{Document, Gesture};
 use crate::preview::theme;
@@ -51,6 +51,8 @@ pub struct PanelState {
     pub gizmo: GizmoMode,
     /// The environment image's file as it is typed.
     pub environment: String,
+    /// A rotation's angles while they are set.
+    pub angles: Option<HeldAngles>,
     /// The list is scrolled to what is selected.
     pub scroll_to_selected: bool,
 }

@@ -14,6 +14,8 @@ use crate::document::{Document, Gesture};
 
 /// Names of the axes.
 const AXES: [&str; 3] = ["X", "Y", "Z"];
+/// The row of the angles among those of a place.
+const ROTATION: usize = 1;
 /// The first colour behind a scene whose environment is hidden: a middle grey.
 const BACKDROP: Vec3 = Vec3::splat(0.18);
 
@@ -84,21 +86,45 @@ fn show_node(ui: &mut Ui, document: &Document, node: u32, state: &mut PanelState
     Grid::new("transform").num_columns(4).spacing([5.0, 4.0]).show(ui, |ui| {
         for (kind, (name, suffix, speed, decimals)) in rows.into_iter().enumerate() {
             ui.label(RichText::new(name).weak());
+            let mut values = if kind == ROTATION { shown_angles(&place, node, state) } else { place.get(kind) };
+            let (mut edited, mut held) = (None, false);
             for axis in 0..3 {
-                let mut value = place.get(kind)[axis];
-                let field = number_field(&mut value).speed(speed).max_decimals(decimals).suffix(suffix);
+                let field = number_field(&mut values[axis]).speed(speed).max_decimals(decimals).suffix(suffix);
                 let response = ui.add_sized([58.0, 20.0], field);
                 name_field(&response, format!("{name} {}", AXES[axis]));
+                held |= gesture(&response) == Gesture::GoesOn || response.has_focus();
                 if response.changed() {
-                    let mut values = place.get(kind);
-                    values[axis] = value;
-                    actions.push(Action::Edit(Edit::Move(node, place.with(kind, values)), gesture(&response)));
+                    edited = Some(gesture(&response));
                 }
+            }
+            let moved = edited.map_or(place.moved, |_| place.with(kind, values));
+            if let Some(gesture) = edited {
+                actions.push(Action::Edit(Edit::Move(node, moved), gesture));
+            }
+            if kind == ROTATION {
+                let rotation = Place { moved, ..place }.rotation();
+                state.angles = held.then_some(HeldAngles { node, rotation, degrees: values });
             }
             ui.end_row();
         }
     });
     materials_of(ui, document, node, actions);
+}
+
+/// The angles of a rotation while a person sets them: other angles mean the same rotation, and those would take their place
+/// in the middle of a drag.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeldAngles {
+    node: u32,
+    /// What they mean; when the node's is another, they count no more.
+    rotation: Quat,
+    /// About X, Y and Z.
+    degrees: Vec3,
+}
+
+fn shown_angles(place: &Place, node: u32, state: &PanelState) -> Vec3 {
+    let held = state.angles.filter(|held| held.node == node && held.rotation == place.rotation());
+    held.map_or_else(|| place.get(ROTATION), |held| held.degrees)
 }
 
 /// The name that a screen reader tells.
@@ -125,6 +151,7 @@ fn materials_of(ui: &mut Ui, document: &Document, node: u32, actions: &mut Vec<A
 }
 
 /// A node's place as numbers: location, rotation (degrees about X, Y and Z), scale.
+#[derive(Clone, Copy)]
 struct Place {
     moved: Move,
     /// In the file.
@@ -147,21 +174,24 @@ impl Place {
         if fine { (rotation, scale) } else { (Quat::IDENTITY, Vec3::ONE) }
     }
 
+    fn rotation(&self) -> Quat {
+        self.moved.rotation * self.file_rotation().0
+    }
+
     /// A change of the location per point of dragging, metres.
     fn step_m(&self) -> f64 {
         f64::from(self.get(0).abs().max_element().max(1.0)) * 0.005
     }
 
     fn get(&self, kind: usize) -> Vec3 {
-        let (rotation, scale) = self.file_rotation();
         match kind {
             0 => self.above.transform_point3(Vec3::from(self.world_from_node.translation) + self.moved.translation),
-            1 => {
-                let (z, y, x) = (self.moved.rotation * rotation).to_euler(EulerRot::ZYX);
+            ROTATION => {
+                let (z, y, x) = self.rotation().to_euler(EulerRot::ZYX);
                 // Adding 0 makes -0 a plain 0.
                 Vec3::new(x, y, z).map(|angle| angle.to_degrees() + 0.0)
             }
-            _ => scale * self.moved.scale,
+            _ => self.file_rotation().1 * self.moved.scale,
         }
     }
 
@@ -173,7 +203,7 @@ impl Place {
                 let translation = in_file - Vec3::from(self.world_from_node.translation);
                 Move { translation, ..self.moved }
             }
-            1 => {
+            ROTATION => {
                 let angles = values.map(f32::to_radians);
                 let wanted = Quat::from_euler(EulerRot::ZYX, angles.z, angles.y, angles.x);
                 Move { rotation: wanted * rotation.inverse(), ..self.moved }
@@ -352,8 +382,7 @@ fn show_environment(ui: &mut Ui, document: &Document, state: &mut PanelState, ac
 /// The object's own axes in the world, for handles that scale along them.
 pub fn own_axes(document: &Document, node: u32) -> (Vec3, Mat3A) {
     let place = Place::of(document, node);
-    let (rotation, _) = place.file_rotation();
-    let turned = place.above.matrix3 * Mat3A::from_quat(place.moved.rotation * rotation);
+    let turned = place.above.matrix3 * Mat3A::from_quat(place.rotation());
     (place.get(0), turned)
 }
 
