@@ -274,6 +274,9 @@ impl Window {
 
     /// What the keys of a run of split times do.
     fn split_keys(&mut self, ctx: &Context, state: &State) {
+        if let Some(action) = self.split.written(ctx) {
+            self.act(Action::Split(action));
+        }
         let Some((open, _)) = &self.scene else { return };
         let gaze = self.gaze_direction.unwrap_or(Vec3::NEG_Z);
         let (yaw, pitch) = crate::view::yaw_pitch(gaze);

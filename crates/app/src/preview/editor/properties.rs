@@ -292,7 +292,8 @@ fn show_light(ui: &mut Ui, document: &Document, index: u32, actions: &mut Vec<Ac
             let label = ui.label(RichText::new(name).weak());
             let mut degrees = angle.to_degrees();
             ui.spacing_mut().slider_width = 84.0;
-            let response = ui.add(number_slider(&mut degrees, range).suffix(" °").max_decimals(2)).labelled_by(label.id);
+            let response =
+                ui.add(number_slider(&mut degrees, range).suffix(" °").max_decimals(2)).labelled_by(label.id);
             if response.changed() {
                 set(LightEdit { angle: Some(degrees.to_radians()), ..edit }, gesture(&response));
             }
