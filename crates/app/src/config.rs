@@ -1,9 +1,12 @@
 //! The folder for this program's settings, and small JSON files in it.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use serde_json::Value;
+
+use crate::output::write_atomically;
 
 /// Where the system keeps a program's settings; `None` when it names no such place.
 pub fn folder() -> Option<PathBuf> {
@@ -39,7 +42,27 @@ pub fn write(path: &Path, value: &Value) -> anyhow::Result<()> {
     if let Some(folder) = path.parent() {
         std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     }
-    let temporary = path.with_extension("json.new");
-    std::fs::write(&temporary, format!("{value:#}\n")).with_context(|| temporary.display().to_string())?;
-    std::fs::rename(&temporary, path).with_context(|| path.display().to_string())
+    Ok(write_atomically(path, |writer| writeln!(writer, "{value:#}").map_err(|error| error.to_string()))?)
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_another_window_is_writing_is_left_alone() {
+        let folder = std::env::temp_dir().join(format!("fovea-config-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&folder);
+        let path = folder.join("settings.json");
+        write(&path, &Value::from(1)).unwrap();
+        // Whatever another process calls its half-written file.
+        let others = ["settings.json.new", ".settings.json.0.part"].map(|name| folder.join(name));
+        others.iter().for_each(|other| std::fs::write(other, "half").unwrap());
+        write(&path, &Value::from(2)).unwrap();
+        assert_eq!(read(&path).unwrap(), Value::from(2));
+        others.iter().for_each(|other| assert_eq!(std::fs::read_to_string(other).unwrap(), "half"));
+        assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 3);
+        std::fs::remove_dir_all(folder).unwrap();
+    }
 }

@@ -1,4 +1,4 @@
-//! Image files: written beside their place, then renamed, so that no file is ever half written.
+//! Files that are written: beside their place, then renamed, so that no file is ever half written.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -104,11 +104,17 @@ pub fn write_atomically(
 
 /// A name in `folder` for a picture of `scene` that no file has yet: `scene-1.png`, `scene-2.png` and so on.
 pub fn free_name(folder: &Path, scene: &str, extension: &str) -> PathBuf {
+    let [path] = free_names(folder, scene, [extension]);
+    path
+}
+
+/// Such names for files that belong together, which differ in their endings alone.
+pub fn free_names<const N: usize>(folder: &Path, scene: &str, extensions: [&str; N]) -> [PathBuf; N] {
     let stem = scene.strip_suffix(".glb").or_else(|| scene.strip_suffix(".gltf")).unwrap_or(scene);
     // A scene's name may hold anything; a file's name may not.
     let stem: String = stem.chars().map(|c| if c.is_alphanumeric() || "-_. ".contains(c) { c } else { '_' }).collect();
-    let name = |number: u64| folder.join(format!("{stem}-{number}.{extension}"));
-    (1..).map(name).find(|path| !path.exists()).unwrap_or_else(|| name(0))
+    let names = |number: u64| extensions.map(|extension| folder.join(format!("{stem}-{number}.{extension}")));
+    (1..).map(names).find(|names| !names.iter().any(|path| path.exists())).unwrap_or_else(|| names(0))
 }
 
 /// A name in the same folder that no other write uses, of this process or another.
@@ -182,6 +188,7 @@ mod tests {
         assert_eq!(free_name(&folder, "a room.glb", "png"), folder.join("a room-1.png"));
         std::fs::write(folder.join("a room-1.png"), "").unwrap();
         assert_eq!(free_name(&folder, "a room.glb", "png"), folder.join("a room-2.png"));
+        assert_eq!(free_names(&folder, "a room.glb", ["csv", "png"])[0], folder.join("a room-2.csv"));
         assert_eq!(free_name(&folder, "../x/y", "exr"), folder.join(".._x_y-1.exr"));
         std::fs::remove_dir_all(folder).unwrap();
     }

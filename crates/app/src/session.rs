@@ -33,6 +33,17 @@ impl Source {
             Self::File(path) => path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned(),
         }
     }
+
+    /// Whether both are the same scene, however its file is named.
+    fn is(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::File(own), Self::File(others)) => {
+                let place = |path: &Path| std::fs::canonicalize(path).ok();
+                own == others || place(own).is_some_and(|own| Some(own) == place(others))
+            }
+            _ => self == other,
+        }
+    }
 }
 
 impl From<Option<&Path>> for Source {
@@ -67,14 +78,19 @@ pub struct Loaded {
     pub files: Vec<PathBuf>,
     /// Images that did not decode, one line each: they may be half written.
     pub replaced_images: Vec<String>,
+    /// The camera that the command line asks for.
+    pub camera: Option<CameraChoice>,
 }
 
-/// Loads a scene and puts the environment that was asked for around it.
+/// Loads a scene and puts the environment that was asked for around it. Scene, moment, variant and camera of the command line
+/// are those of the file that it names: they do not count for another one.
 ///
 /// # Errors
 /// When the scene or the environment image cannot be read.
 pub fn load(source: &Source, args: &SceneArgs) -> anyhow::Result<Loaded> {
-    let (mut scene, report) = import(source, &args.file)?;
+    let is_named = source.is(&Source::from(args.scene.as_deref()));
+    let (file, camera) = if is_named { (args.file.clone(), args.camera.clone()) } else { Default::default() };
+    let (mut scene, report) = import(source, &file)?;
     let mut warnings = report.warnings;
     let mut repaired = None;
     let environment = match (&args.background, &args.env) {
@@ -109,7 +125,7 @@ pub fn load(source: &Source, args: &SceneArgs) -> anyhow::Result<Loaded> {
     let replaced_images = warnings.iter().filter(is_replaced).map(ToString::to_string).collect();
     let notes = warnings.iter().map(ToString::to_string).chain(repaired).collect();
     let files = report.files.into_iter().chain(args.env.clone()).collect();
-    Ok(Loaded { scene: Arc::new(scene), notes, nodes: report.nodes, files, replaced_images })
+    Ok(Loaded { scene: Arc::new(scene), notes, nodes: report.nodes, files, replaced_images, camera })
 }
 
 /// Reads a scene as it is.

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use clap::Parser;
 use fovea_app::cli::Cli;
+use fovea_app::cli::values::CameraChoice;
 use fovea_app::reload::rule::Timing;
 use fovea_app::reload::{LoadEvent, Loader};
 use fovea_app::session::{Loaded, Source};
@@ -22,8 +23,12 @@ fn scratch(name: &str) -> PathBuf {
 }
 
 fn loader() -> Loader {
+    loader_of(&["fovea"])
+}
+
+fn loader_of(line: &[&str]) -> Loader {
     let timing = Timing { quiet: QUIET, poll: Duration::from_millis(200), grace: Duration::from_millis(500) };
-    Loader::start(Cli::parse_from(["fovea"]).preview.scene, timing, || {}).unwrap()
+    Loader::start(Cli::parse_from(line).preview.scene, timing, || {}).unwrap()
 }
 
 /// Waits for an event that satisfies `wanted`, handing all others to `other`.
@@ -167,6 +172,35 @@ fn a_thousand_rewrites_never_show_a_broken_scene() {
     }
     eprintln!("{shown} versions shown; the writer was kept waiting within {undecided} of 1000");
     assert!(shown >= 10, "only {shown} versions were shown");
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn what_the_command_line_says_of_its_file_counts_for_no_other() {
+    let folder = scratch("others");
+    let [named, other] = ["named.glb", "other.glb"].map(|name| folder.join(name));
+    std::fs::write(&named, glb(1)).unwrap();
+    std::fs::write(&other, glb(2)).unwrap();
+    let line = ["fovea", named.to_str().unwrap(), "--variant", "red", "--camera", "1"];
+    let loader = loader_of(&line);
+    let open = |path: &Path| {
+        loader.open(Source::File(path.to_owned()));
+        wait(&loader, |_| {}, |event| matches!(event, LoadEvent::Opened(..) | LoadEvent::NotOpened(_)))
+    };
+    // The file has no such variant.
+    assert!(matches!(open(&named), LoadEvent::NotOpened(text) if text.contains("red")));
+    let opened = open(&other);
+    assert_eq!((version(loaded(&opened)), loaded(&opened).camera.is_none()), (2, true));
+    // By another name it is still the one.
+    assert!(matches!(open(&folder.join(".").join("named.glb")), LoadEvent::NotOpened(text) if text.contains("red")));
+
+    let loader = loader_of(&["fovea", named.to_str().unwrap(), "--camera", "1"]);
+    loader.open(Source::File(named.clone()));
+    let opened = wait(&loader, |_| {}, |event| matches!(event, LoadEvent::Opened(..)));
+    assert_eq!(loaded(&opened).camera, Some(CameraChoice::Index(1)));
+    std::fs::write(&named, glb(3)).unwrap();
+    let changed = wait(&loader, |_| {}, |event| matches!(event, LoadEvent::Changed(scene) if version(scene) == 3));
+    assert_eq!(loaded(&changed).camera, Some(CameraChoice::Index(1)));
     std::fs::remove_dir_all(folder).unwrap();
 }
 

@@ -8,6 +8,7 @@ use egui::Context;
 use rfd::{AsyncFileDialog, FileHandle};
 
 use super::background::Background;
+use crate::output::free_name;
 
 /// Nobody has looked at a dialog that is gone so soon: there was none.
 const NO_DIALOG: Duration = Duration::from_millis(300);
@@ -42,10 +43,18 @@ impl Purpose {
         }
     }
 
-    /// A name that was chosen for a new file, with an ending if it has none.
+    /// A name that was chosen for a new file, with the ending of what is written where it has another or none. The dialog has
+    /// not asked whether that one may be replaced.
     fn complete(self, path: PathBuf) -> PathBuf {
         let (_, _, endings, writes) = self.describe();
-        if writes && path.extension().is_none() { path.with_extension(endings[0]) } else { path }
+        let has = |ending: &&str| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(ending));
+        let (Some(name), Some(ending)) = (path.file_name(), endings.first()) else { return path };
+        if !writes || endings.iter().any(has) {
+            return path;
+        }
+        let name = name.to_string_lossy();
+        let completed = path.with_file_name(format!("{name}.{ending}"));
+        if completed.exists() { free_name(path.parent().unwrap_or(Path::new("")), &name, ending) } else { completed }
     }
 }
 
@@ -112,14 +121,35 @@ impl Dialogs {
 }
 
 #[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
 
     #[test]
     fn a_new_files_name_gets_its_ending() {
         let complete = |purpose: Purpose, name: &str| purpose.complete(PathBuf::from(name));
-        assert_eq!(complete(Purpose::SavePicture, "a"), PathBuf::from("a.png"));
-        assert_eq!(complete(Purpose::SaveFilm, "room.v2"), PathBuf::from("room.v2"));
-        assert_eq!(complete(Purpose::Scene, "room"), PathBuf::from("room"));
+        for (purpose, name, completed) in [
+            (Purpose::SavePicture, "a", "a.png"),
+            (Purpose::SavePicture, "room.v2", "room.v2.png"),
+            (Purpose::SavePicture, "room.jpg", "room.jpg.png"),
+            (Purpose::SavePicture, "room.PNG", "room.PNG"),
+            (Purpose::SaveFilm, "room.png", "room.png.exr"),
+            (Purpose::SaveEdits, "room.fovea.json", "room.fovea.json"),
+            (Purpose::Scene, "room", "room"),
+            (Purpose::Environment, "sky.jpg", "sky.jpg"),
+        ] {
+            assert_eq!(complete(purpose, name), PathBuf::from(completed), "{purpose:?}");
+        }
+    }
+
+    #[test]
+    fn a_file_that_nobody_was_asked_about_is_not_replaced() {
+        let folder = std::env::temp_dir().join(format!("fovea-dialogs-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&folder);
+        std::fs::create_dir_all(&folder).unwrap();
+        std::fs::write(folder.join("room.v2.png"), "").unwrap();
+        assert_eq!(Purpose::SavePicture.complete(folder.join("room.v2")), folder.join("room.v2-1.png"));
+        assert_eq!(Purpose::SavePicture.complete(folder.join("room.v2.png")), folder.join("room.v2.png"));
+        std::fs::remove_dir_all(folder).unwrap();
     }
 }

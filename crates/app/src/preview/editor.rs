@@ -130,6 +130,12 @@ impl Editor {
         let rect = response.rect;
         if ui.input(|input| input.pointer.any_pressed()) {
             self.document.end_gesture();
+            // What is being typed is for what is selected now.
+            if response.is_pointer_button_down_on()
+                && let Some(field) = ui.memory(egui::Memory::focused)
+            {
+                ui.memory_mut(|memory| memory.surrender_focus(field));
+            }
         }
         // With Alt the drag is the view's.
         if response.drag_started_by(PointerButton::Primary) && !ui.input(|input| input.modifiers.alt) {

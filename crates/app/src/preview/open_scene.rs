@@ -6,7 +6,6 @@ use glam::Vec3;
 use tracer::scene::Scene;
 
 use super::controls::metric;
-use crate::cli::values::CameraChoice;
 use crate::session::{self, Loaded, Viewpoint};
 
 /// A scene on screen.
@@ -28,11 +27,11 @@ pub struct OpenScene {
 
 impl OpenScene {
     /// From what was loaded; a camera that does not exist is a note.
-    pub fn new(loaded: &Loaded, camera: Option<&CameraChoice>) -> Self {
+    pub fn new(loaded: &Loaded) -> Self {
         let scene: &Arc<Scene> = &loaded.scene;
         let mut notes = loaded.notes.clone();
         let viewpoints = session::viewpoints(scene);
-        let start = session::choose(&viewpoints, camera).unwrap_or_else(|error| {
+        let start = session::choose(&viewpoints, loaded.camera.as_ref()).unwrap_or_else(|error| {
             notes.insert(0, session::one_line(&error));
             0
         });

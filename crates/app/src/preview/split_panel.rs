@@ -1,6 +1,8 @@
 //! The split times in the window: a panel to start a run, keys while it goes on, files when it is done.
 
-use std::path::Path;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
 
 use egui::{Align2, Area, Context, DragValue, Id, Key, Modifiers, RichText, Ui};
@@ -9,8 +11,11 @@ use tracer::provenance::Provenance;
 use super::controls::MODES;
 use super::theme;
 use crate::cli::choices::Mode;
-use crate::output::free_name;
+use crate::output::{OutputError, free_names, write_atomically};
 use crate::split_times::{After, Moment, Plan, Run};
+
+/// How long until the window looks whether results are written.
+const LOOK_AGAIN: Duration = Duration::from_millis(50);
 
 /// What a run asks of the window.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,13 +35,25 @@ pub struct SplitTimes {
     started: Option<Instant>,
     /// The last run's medians.
     summary: Vec<String>,
+    /// The last run's results on their way to their files.
+    writing: Option<JoinHandle<Action>>,
+}
+
+impl Drop for SplitTimes {
+    /// A window that closes waits for the results: nobody can repeat them.
+    fn drop(&mut self) {
+        if let Some(writing) = self.writing.take() {
+            // A panic of the thread has been reported by the panic hook.
+            let _ = writing.join();
+        }
+    }
 }
 
 impl Default for SplitTimes {
     fn default() -> Self {
         let plan =
             Plan { modes: MODES.map(|entry| entry.0).to_vec(), repetitions: 3, blind: true, object: String::new() };
-        Self { plan, run: None, started: None, summary: Vec::new() }
+        Self { plan, run: None, started: None, summary: Vec::new(), writing: None }
     }
 }
 
@@ -92,9 +109,23 @@ impl SplitTimes {
         self.run = None;
     }
 
+    /// Tells that results have been written, or why not.
+    pub fn written(&mut self, ctx: &Context) -> Option<Action> {
+        if self.writing.as_ref().is_some_and(|writing| !writing.is_finished()) {
+            ctx.request_repaint_after(LOOK_AGAIN);
+            return None;
+        }
+        // As when the window closes.
+        self.writing.take()?.join().ok()
+    }
+
     /// Takes the run's keys. `samples` and `gaze_deg` are those of this moment.
     pub fn keys(&mut self, ctx: &Context, now: Instant, moment: (u64, [f64; 2]), scene: &Scene<'_>) -> Vec<Action> {
         let Some(run) = &mut self.run else { return Vec::new() };
+        // Letters of a text are no answers.
+        if ctx.egui_wants_keyboard_input() {
+            return Vec::new();
+        }
         let pressed = |key| ctx.input_mut(|input| input.consume_key(Modifiers::NONE, key));
         let elapsed = self.started.map_or(Duration::ZERO, |started| now.saturating_duration_since(started));
         let moment = Moment { elapsed, samples: moment.0, gaze_deg: moment.1 };
@@ -121,13 +152,22 @@ impl SplitTimes {
             format!("{}: outline {outline:.1} s, material {material:.1} s ({count})", short(mode))
         };
         self.summary = run.medians().into_iter().map(line).collect();
-        let path = free_name(scene.folder, "split-times", "csv");
-        let csv = run.csv(scene.name, &Provenance::without_gpu(scene.adapter));
-        let written = std::fs::write(&path, csv).and_then(|()| std::fs::write(path.with_extension("svg"), run.svg()));
-        vec![match written {
-            Ok(()) => Action::Tell(format!("{} and its .svg", path.display()), false),
-            Err(error) => Action::Tell(format!("{}: {error}", path.display()), true),
-        }]
+        let [name, adapter] = [scene.name, scene.adapter].map(ToOwned::to_owned);
+        let folder = scene.folder.to_owned();
+        let spawned = std::thread::Builder::new().name("write split times".into()).spawn(move || {
+            let names = free_names(&folder, "split-times", ["csv", "svg"]);
+            match write(&names, &[run.csv(&name, &Provenance::without_gpu(&adapter)), run.svg()]) {
+                Ok(()) => Action::Tell(format!("{} and its .svg", names[0].display()), false),
+                Err(error) => Action::Tell(error.to_string(), true),
+            }
+        });
+        match spawned {
+            Ok(writing) => {
+                self.writing = Some(writing);
+                Vec::new()
+            }
+            Err(error) => vec![Action::Tell(format!("split times are not written: {error}"), true)],
+        }
     }
 
     /// Says what is waited for, at the top of the window.
@@ -145,6 +185,12 @@ impl SplitTimes {
             });
         });
     }
+}
+
+fn write(names: &[PathBuf; 2], texts: &[String; 2]) -> Result<(), OutputError> {
+    names.iter().zip(texts).try_for_each(|(path, text)| {
+        write_atomically(path, |writer| writer.write_all(text.as_bytes()).map_err(|error| error.to_string()))
+    })
 }
 
 /// What stands in the results.

@@ -29,7 +29,6 @@ use super::split_panel::{self, SplitTimes};
 use super::versions::Versions;
 use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
-use crate::cli::values::CameraChoice;
 use crate::preferences::Store;
 use crate::reload::{LoadEvent, Loader};
 use crate::session::{Loaded, Source};
@@ -49,8 +48,6 @@ const WORTH_SAYING: Duration = Duration::from_millis(200);
 pub struct Window {
     engine: Engine,
     loader: Loader,
-    /// Camera that the command line asked for.
-    asked_camera: Option<CameraChoice>,
     /// What the window itself has to tell.
     note: Option<Message>,
     /// Why the files of the open scene cannot be read as they are now.
@@ -96,7 +93,6 @@ impl Window {
         Self {
             engine,
             loader,
-            asked_camera: args.scene.camera.clone(),
             note: None,
             broken: None,
             adapter,
@@ -166,7 +162,7 @@ impl Window {
     }
 
     fn open(&mut self, source: &Source, loaded: &Loaded, rect: Rect) {
-        let open = OpenScene::new(loaded, self.asked_camera.as_ref());
+        let open = OpenScene::new(loaded);
         let aspect = rect.width() / rect.height().max(1.0);
         // What there was to say before there was anything to see is said now.
         self.note = self.files.trouble.take().map(|text| Message::now(text, false));
@@ -187,7 +183,7 @@ impl Window {
     fn follow_file(&mut self, loaded: &Loaded) {
         self.broken = None;
         if let (Some((open, navigation)), Some(editor)) = (&mut self.scene, &mut self.editor) {
-            *open = OpenScene::new(loaded, self.asked_camera.as_ref());
+            *open = OpenScene::new(loaded);
             navigation.set_scale(open.diagonal);
             self.camera = self.camera.min(open.viewpoints.len().saturating_sub(1));
             editor.follow_file(loaded);
@@ -268,6 +264,9 @@ impl Window {
 
     /// What the keys of a run of split times do.
     fn split_keys(&mut self, ctx: &Context, state: &State) {
+        if let Some(action) = self.split.written(ctx) {
+            self.act(Action::Split(action));
+        }
         let Some((open, _)) = &self.scene else { return };
         let gaze = self.gaze_direction.unwrap_or(Vec3::NEG_Z);
         let (yaw, pitch) = crate::view::yaw_pitch(gaze);

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use egui::{Align2, Area, Context, Id, Response, RichText, ScrollArea, TextEdit, Ui, WidgetInfo, accesskit};
 
 use super::gizmo::GizmoMode;
-use super::properties;
+use super::properties::{self, HeldAngles};
 use crate::document::edits::{Edit, Part};
 use crate::document::{Document, Gesture};
 use crate::preview::theme;
@@ -52,6 +52,8 @@ pub struct PanelState {
     pub gizmo: GizmoMode,
     /// The environment image's file as it is typed.
     pub environment: String,
+    /// A rotation's angles while they are set.
+    pub angles: Option<HeldAngles>,
     /// The list is scrolled to what is selected.
     pub scroll_to_selected: bool,
 }
@@ -97,9 +99,14 @@ pub fn panel(
             ui.separator();
             let left = (height - ui.min_rect().height() - 24.0).max(80.0);
             let area = ScrollArea::vertical().id_salt("properties").max_height(left).min_scrolled_height(left);
-            area.auto_shrink([false, true]).show(ui, |ui| properties::show(ui, document, part, state, actions));
+            area.auto_shrink([false, true]).show(ui, |ui| {
+                // What is typed for one part must not count for the next that is selected.
+                ui.push_id(part, |ui| properties::show(ui, document, part, state, actions));
+            });
         });
     });
+    // A click may end typing: what was typed comes before what the click asks for.
+    actions.sort_by_key(|action| !matches!(action, Action::Edit(edit, _) if !matches!(edit, Edit::Reset(_))));
 }
 
 fn history(ui: &mut Ui, document: &Document, actions: &mut Vec<Action>) {

@@ -1,6 +1,8 @@
 //! The properties of what is selected, as fields, sliders and colours.
 
-use egui::{DragValue, Grid, Response, RichText, Slider, Ui};
+use std::ops::RangeInclusive;
+
+use egui::{DragValue, Grid, Response, RichText, Slider, SliderClamping, Ui};
 use glam::{Affine3A, EulerRot, Mat3A, Quat, Vec3};
 use tracer::scene::{Backdrop, Environment, PunctualKind};
 
@@ -12,6 +14,8 @@ use crate::document::{Document, Gesture};
 
 /// Names of the axes.
 const AXES: [&str; 3] = ["X", "Y", "Z"];
+/// The row of the angles among those of a place.
+const ROTATION: usize = 1;
 /// The first colour behind a scene whose environment is hidden: a middle grey.
 const BACKDROP: Vec3 = Vec3::splat(0.18);
 
@@ -54,6 +58,16 @@ fn gesture(response: &Response) -> Gesture {
     if response.dragged() || response.is_pointer_button_down_on() { Gesture::GoesOn } else { Gesture::Once }
 }
 
+/// A field for a number. What is typed counts when it is done: half a number is another one.
+fn number_field(value: &mut f32) -> DragValue<'_> {
+    DragValue::new(value).update_while_editing(false)
+}
+
+/// A slider with such a field. What the file says is shown as it is, also outside of the slider's range.
+fn number_slider(value: &mut f32, range: RangeInclusive<f32>) -> Slider<'_> {
+    Slider::new(value, range).update_while_editing(false).clamping(SliderClamping::Edits)
+}
+
 fn show_node(ui: &mut Ui, document: &Document, node: u32, state: &mut PanelState, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 3.0;
@@ -72,21 +86,45 @@ fn show_node(ui: &mut Ui, document: &Document, node: u32, state: &mut PanelState
     Grid::new("transform").num_columns(4).spacing([5.0, 4.0]).show(ui, |ui| {
         for (kind, (name, suffix, speed, decimals)) in rows.into_iter().enumerate() {
             ui.label(RichText::new(name).weak());
+            let mut values = if kind == ROTATION { shown_angles(&place, node, state) } else { place.get(kind) };
+            let (mut edited, mut held) = (None, false);
             for axis in 0..3 {
-                let mut value = place.get(kind)[axis];
-                let field = DragValue::new(&mut value).speed(speed).max_decimals(decimals).suffix(suffix);
+                let field = number_field(&mut values[axis]).speed(speed).max_decimals(decimals).suffix(suffix);
                 let response = ui.add_sized([58.0, 20.0], field);
                 name_field(&response, format!("{name} {}", AXES[axis]));
+                held |= gesture(&response) == Gesture::GoesOn || response.has_focus();
                 if response.changed() {
-                    let mut values = place.get(kind);
-                    values[axis] = value;
-                    actions.push(Action::Edit(Edit::Move(node, place.with(kind, values)), gesture(&response)));
+                    edited = Some(gesture(&response));
                 }
+            }
+            let moved = edited.map_or(place.moved, |_| place.with(kind, values));
+            if let Some(gesture) = edited {
+                actions.push(Action::Edit(Edit::Move(node, moved), gesture));
+            }
+            if kind == ROTATION {
+                let rotation = Place { moved, ..place }.rotation();
+                state.angles = held.then_some(HeldAngles { node, rotation, degrees: values });
             }
             ui.end_row();
         }
     });
     materials_of(ui, document, node, actions);
+}
+
+/// The angles of a rotation while a person sets them: other angles mean the same rotation, and those would take their place
+/// in the middle of a drag.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeldAngles {
+    node: u32,
+    /// What they mean; when the node's is another, they count no more.
+    rotation: Quat,
+    /// About X, Y and Z.
+    degrees: Vec3,
+}
+
+fn shown_angles(place: &Place, node: u32, state: &PanelState) -> Vec3 {
+    let held = state.angles.filter(|held| held.node == node && held.rotation == place.rotation());
+    held.map_or_else(|| place.get(ROTATION), |held| held.degrees)
 }
 
 /// The name that a screen reader tells.
@@ -113,6 +151,7 @@ fn materials_of(ui: &mut Ui, document: &Document, node: u32, actions: &mut Vec<A
 }
 
 /// A node's place as numbers: location, rotation (degrees about X, Y and Z), scale.
+#[derive(Clone, Copy)]
 struct Place {
     moved: Move,
     /// In the file.
@@ -135,21 +174,24 @@ impl Place {
         if fine { (rotation, scale) } else { (Quat::IDENTITY, Vec3::ONE) }
     }
 
+    fn rotation(&self) -> Quat {
+        self.moved.rotation * self.file_rotation().0
+    }
+
     /// A change of the location per point of dragging, metres.
     fn step_m(&self) -> f64 {
         f64::from(self.get(0).abs().max_element().max(1.0)) * 0.005
     }
 
     fn get(&self, kind: usize) -> Vec3 {
-        let (rotation, scale) = self.file_rotation();
         match kind {
             0 => self.above.transform_point3(Vec3::from(self.world_from_node.translation) + self.moved.translation),
-            1 => {
-                let (z, y, x) = (self.moved.rotation * rotation).to_euler(EulerRot::ZYX);
+            ROTATION => {
+                let (z, y, x) = self.rotation().to_euler(EulerRot::ZYX);
                 // Adding 0 makes -0 a plain 0.
                 Vec3::new(x, y, z).map(|angle| angle.to_degrees() + 0.0)
             }
-            _ => scale * self.moved.scale,
+            _ => self.file_rotation().1 * self.moved.scale,
         }
     }
 
@@ -161,7 +203,7 @@ impl Place {
                 let translation = in_file - Vec3::from(self.world_from_node.translation);
                 Move { translation, ..self.moved }
             }
-            1 => {
+            ROTATION => {
                 let angles = values.map(f32::to_radians);
                 let wanted = Quat::from_euler(EulerRot::ZYX, angles.z, angles.y, angles.x);
                 Move { rotation: wanted * rotation.inverse(), ..self.moved }
@@ -203,7 +245,7 @@ fn number_row(
     mut number: f32,
 ) -> Option<(Value, Gesture)> {
     ui.spacing_mut().slider_width = 84.0;
-    let response = ui.add(Slider::new(&mut number, parameter.range()).max_decimals(3)).labelled_by(label.id);
+    let response = ui.add(number_slider(&mut number, parameter.range()).max_decimals(3)).labelled_by(label.id);
     response.changed().then(|| (Value::Number(number), gesture(&response)))
 }
 
@@ -219,7 +261,7 @@ fn strong_color(ui: &mut Ui, label: &Response, value: Vec3) -> Option<(Vec3, Ges
             edited = Some((Vec3::from_array(rgb) * strength, Gesture::GoesOn));
         }
         let speed = f64::from(strength.max(0.1)) * 0.01;
-        let response = ui.add(DragValue::new(&mut strength).range(0.0..=1e6).speed(speed).max_decimals(3));
+        let response = ui.add(number_field(&mut strength).range(0.0..=1e6).speed(speed).max_decimals(3));
         name_field(&response, "Strength".into());
         if response.changed() {
             edited = Some((color * strength, gesture(&response)));
@@ -250,7 +292,8 @@ fn show_light(ui: &mut Ui, document: &Document, index: u32, actions: &mut Vec<Ac
             let label = ui.label(RichText::new(name).weak());
             let mut degrees = angle.to_degrees();
             ui.spacing_mut().slider_width = 84.0;
-            let response = ui.add(Slider::new(&mut degrees, range).suffix(" °").max_decimals(2)).labelled_by(label.id);
+            let response =
+                ui.add(number_slider(&mut degrees, range).suffix(" °").max_decimals(2)).labelled_by(label.id);
             if response.changed() {
                 set(LightEdit { angle: Some(degrees.to_radians()), ..edit }, gesture(&response));
             }
@@ -261,7 +304,7 @@ fn show_light(ui: &mut Ui, document: &Document, index: u32, actions: &mut Vec<Ac
             ui.horizontal(|ui| {
                 for axis in 0..3 {
                     let mut value = light.position[axis];
-                    let field = DragValue::new(&mut value).speed(0.01).max_decimals(3).suffix(" m");
+                    let field = number_field(&mut value).speed(0.01).max_decimals(3).suffix(" m");
                     let response = ui.add_sized([54.0, 20.0], field);
                     name_field(&response, format!("Location {}", AXES[axis]));
                     if response.changed() {
@@ -303,7 +346,7 @@ fn show_environment(ui: &mut Ui, document: &Document, state: &mut PanelState, ac
             ui.spacing_mut().slider_width = 84.0;
             let label = ui.label(RichText::new("Rotation").weak());
             let mut degrees = *rotation_deg;
-            let slider = Slider::new(&mut degrees, -180.0..=180.0).suffix(" °").max_decimals(1);
+            let slider = number_slider(&mut degrees, -180.0..=180.0).suffix(" °").max_decimals(1);
             let response = ui.add(slider).labelled_by(label.id);
             if response.changed() {
                 set(EnvironmentEdit { rotation_deg: Some(degrees), ..edit.clone() }, gesture(&response));
@@ -311,7 +354,7 @@ fn show_environment(ui: &mut Ui, document: &Document, state: &mut PanelState, ac
             ui.end_row();
             let label = ui.label(RichText::new("Intensity").weak());
             let mut factor = *intensity;
-            let slider = Slider::new(&mut factor, 0.0..=100.0).logarithmic(true).max_decimals(3);
+            let slider = number_slider(&mut factor, 0.0..=100.0).logarithmic(true).max_decimals(3);
             let response = ui.add(slider).labelled_by(label.id);
             if response.changed() {
                 set(EnvironmentEdit { intensity: Some(factor), ..edit.clone() }, gesture(&response));
@@ -339,8 +382,7 @@ fn show_environment(ui: &mut Ui, document: &Document, state: &mut PanelState, ac
 /// The object's own axes in the world, for handles that scale along them.
 pub fn own_axes(document: &Document, node: u32) -> (Vec3, Mat3A) {
     let place = Place::of(document, node);
-    let (rotation, _) = place.file_rotation();
-    let turned = place.above.matrix3 * Mat3A::from_quat(place.moved.rotation * rotation);
+    let turned = place.above.matrix3 * Mat3A::from_quat(place.rotation());
     (place.get(0), turned)
 }
 
