@@ -56,6 +56,7 @@ pub struct Editor {
     picker: Picker,
     drag: Option<Drag>,
     outline: Option<(OutlineOf, Vec<Segment>)>,
+    source: Source,
     sidecar: PathBuf,
     message: Option<Message>,
 }
@@ -63,11 +64,7 @@ pub struct Editor {
 impl Editor {
     /// For a scene that was opened, with the edits that were saved beside it.
     pub fn open(source: &Source, loaded: &Loaded) -> Self {
-        let sidecar = match source {
-            Source::BuiltIn => sidecar::path_for(Path::new(BUILT_IN)),
-            Source::File(path) => sidecar::path_for(path),
-        };
-        let mut editor = Self::new(loaded, sidecar);
+        let mut editor = Self::new(source, loaded);
         if editor.sidecar.exists() {
             editor.message = Some(match editor.document.load_edits(&editor.sidecar) {
                 Ok(left_out) if left_out.is_empty() => {
@@ -82,8 +79,12 @@ impl Editor {
         editor
     }
 
-    /// Without edits; they are saved to `sidecar`.
-    fn new(loaded: &Loaded, sidecar: PathBuf) -> Self {
+    /// Without edits.
+    fn new(source: &Source, loaded: &Loaded) -> Self {
+        let sidecar = match source {
+            Source::BuiltIn => sidecar::path_for(Path::new(BUILT_IN)),
+            Source::File(path) => sidecar::path_for(path),
+        };
         Self {
             document: Document::new(loaded),
             panel: PanelState::default(),
@@ -91,6 +92,7 @@ impl Editor {
             drag: None,
             outline: None,
             message: None,
+            source: source.clone(),
             sidecar,
         }
     }
@@ -98,6 +100,11 @@ impl Editor {
     /// The scene with its edits.
     pub fn document(&self) -> &Document {
         &self.document
+    }
+
+    /// Where the scene comes from.
+    pub fn source(&self) -> &Source {
+        &self.source
     }
 
     /// Goes on from a newer version of the file.
@@ -256,7 +263,9 @@ impl Editor {
             Action::Solo(node) => self.document.set_solo(node),
             Action::Undo => self.document.undo(),
             Action::Redo => self.document.redo(),
-            Action::Save => self.save(),
+            Action::Save => {
+                self.save();
+            }
             Action::Camera(_) => {}
         }
     }
@@ -281,18 +290,21 @@ impl Editor {
         }
     }
 
-    fn save(&mut self) {
-        self.save_as(&self.sidecar.clone());
+    /// Saves the edits beside the scene; whether that went well.
+    pub fn save(&mut self) -> bool {
+        self.save_as(&self.sidecar.clone())
     }
 
     /// Saves the edits to a file; only the one beside the scene is read again with it.
-    pub fn save_as(&mut self, path: &Path) {
+    pub fn save_as(&mut self, path: &Path) -> bool {
         let is_sidecar = path == self.sidecar;
         let saved = if is_sidecar { self.document.save_edits(path) } else { self.document.copy_edits(path) };
+        let is_saved = saved.is_ok();
         self.message = Some(match saved {
             Ok(()) => Message::now(format!("saved {}", path.display()), false),
             Err(error) => Message::now(error.to_string(), true),
         });
+        is_saved
     }
 
     /// Hides what is selected.

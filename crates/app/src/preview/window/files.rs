@@ -107,12 +107,19 @@ impl Window {
     pub(super) fn act_on_file(&mut self, action: file_menu::Action) {
         match action {
             file_menu::Action::Choose(purpose) => self.files.asked = Some(purpose),
-            file_menu::Action::Open(path) => self.loader.open(Source::File(path)),
+            file_menu::Action::Open(path) => self.open_scene(Source::File(path)),
         }
     }
 
     /// Takes dropped files, answers of dialogs, films that were read, and what has changed of the settings.
     pub(super) fn follow_files(&mut self, ctx: &Context, frame: &eframe::Frame) {
+        if !self.unsaved.is_asking() {
+            self.take_files(ctx, frame);
+        }
+        self.remember(ctx, frame);
+    }
+
+    fn take_files(&mut self, ctx: &Context, frame: &eframe::Frame) {
         self.open_dropped_file(ctx);
         if let Some(purpose) = self.files.asked.take() {
             let scene = self.scene.as_ref().map_or("picture", |(scene, _)| scene.name.as_str());
@@ -133,7 +140,6 @@ impl Window {
         if let Some(read) = self.files.films.poll() {
             self.take_film(read);
         }
-        self.remember(ctx, frame);
     }
 
     fn open_dropped_file(&mut self, ctx: &Context) {
@@ -153,7 +159,7 @@ impl Window {
     fn take_file(&mut self, ctx: &Context, purpose: Purpose, path: PathBuf) {
         self.files.folder = path.parent().filter(|folder| folder.is_absolute()).map(Path::to_owned);
         match purpose {
-            Purpose::Scene => self.loader.open(Source::File(path)),
+            Purpose::Scene => self.open_scene(Source::File(path)),
             Purpose::Environment => {
                 if let Some(editor) = &mut self.editor {
                     editor.set_environment(path);
