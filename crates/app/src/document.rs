@@ -2,7 +2,7 @@
 //!
 //! A document makes immutable [`Scene`] versions and never changes one. Edits are values ([`Edits`]); undo puts earlier
 //! ones back. When the file changes on disk, the edits are put onto the new version wherever a part of the same name is
-//! still there.
+//! still there; those of other parts wait until theirs are back.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -239,22 +239,23 @@ impl Document {
     }
 
     /// Goes on from a newer version of the file. What is selected is named by its new index, if it is still there; edits
-    /// of parts that are gone are dropped, and named.
+    /// of parts that are gone wait for them, and the parts are named.
     pub fn follow_file(&mut self, loaded: &Loaded, selected: Option<Part>) -> (Option<Part>, Vec<String>) {
         let names = Names::of(&loaded.scene, &loaded.nodes);
         let places = reapply::Places::new(&self.names, &names);
-        let dropped = places.missing(&self.edits, &self.names);
+        let gone = places.missing(&self.edits);
         for edits in self.undo.iter_mut().chain(&mut self.redo).chain([&mut self.edits, &mut self.saved]) {
             *edits = places.of_edits(edits);
         }
         self.solo = self.solo.and_then(|node| places.node(node));
+        let selected = selected.and_then(|part| places.part(part));
         self.file = Arc::new((*loaded.scene).clone().sharing_parts_of(&self.file));
         self.tree = Tree::new(&loaded.nodes, &self.file);
         self.nodes = tree::with_pivots(&loaded.nodes, &self.tree, &self.file);
         self.names = names;
         self.end_gesture();
         self.remake();
-        (selected.and_then(|part| places.part(part)), dropped)
+        (selected, gone)
     }
 
     fn remake(&mut self) {

@@ -263,6 +263,40 @@ fn saved_edits_are_read_back_the_same() {
 }
 
 #[test]
+fn edits_of_parts_that_are_gone_are_saved_and_wait_for_them() {
+    let loaded = built_in();
+    let mut document = Document::new(&loaded);
+    document.edit(&Edit::Hide(document.tree().roots[0], true), Gesture::Once);
+    document.edit(&rough(0, 0.75), Gesture::Once);
+    let edits = document.edits().clone();
+
+    // The first material has another name for a while.
+    let mut other = loaded.clone();
+    let mut scene = (*loaded.scene).clone();
+    scene.materials[0] = Arc::new(tracer::scene::Material { name: "new".into(), ..(*scene.materials[0]).clone() });
+    other.scene = Arc::new(scene);
+    document.follow_file(&other, None);
+    assert!(document.edits().materials.is_empty() && document.is_unsaved());
+    let path = std::env::temp_dir().join(format!("fovea-absent-{}.json", std::process::id()));
+    document.save_edits(&path).unwrap();
+    document.edit(&rough(1, 0.5), Gesture::Once);
+    document.undo();
+    assert!(document.follow_file(&loaded, None).1.is_empty());
+    assert_eq!((document.edits(), document.is_unsaved()), (&edits, false));
+    assert_eq!(document.version().materials[0].roughness, 0.75);
+
+    // The same by way of the file: read with the part missing, and saved again.
+    let mut document = Document::new(&other);
+    let name = &loaded.scene.materials[0].name;
+    assert_eq!(document.load_edits(&path).unwrap(), [format!("material '{name}'")]);
+    document.save_edits(&path).unwrap();
+    let mut document = Document::new(&loaded);
+    assert_eq!(document.load_edits(&path).unwrap(), Vec::<String>::new());
+    assert_eq!(document.edits(), &edits);
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
 fn a_backdrop_hides_the_environment_and_undo_shows_it_again() {
     let loaded = built_in();
     let mut document = Document::new(&loaded);

@@ -106,12 +106,19 @@ pub(super) fn with_pivots(nodes: &[SceneNode], tree: &Tree, scene: &Scene) -> Ve
 }
 
 /// What a part is called: its name, and which of those that share it.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct PartName {
     /// May be empty.
     pub name: String,
     /// 0 for the first of that name.
     pub occurrence: u32,
+}
+
+impl PartName {
+    /// What it is, and its name: on one line, whatever the file says.
+    pub fn part(&self, kind: &str) -> String {
+        format!("{kind} '{}'", self.name.replace(['\n', '\r'], " "))
+    }
 }
 
 /// The names of a list of parts, in order.
@@ -125,10 +132,4 @@ pub fn part_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<PartName>
             PartName { name: name.to_owned(), occurrence: *count - 1 }
         })
         .collect()
-}
-
-/// Where the parts of one list are in another, by name.
-pub fn places(from: &[PartName], to: &[PartName]) -> Vec<Option<u32>> {
-    let index: HashMap<&PartName, u32> = to.iter().zip(0..).collect();
-    from.iter().map(|name| index.get(name).copied()).collect()
 }

@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use anyhow::Context as _;
 use egui::{Color32, Context, PointerButton, Pos2, Rect, Response, Stroke, Ui};
 use glam::Vec3;
 use tracer::scene::{EnvironmentImage, Scene};
@@ -11,6 +12,7 @@ use tracer::scene::{EnvironmentImage, Scene};
 use super::engine::Message;
 use super::navigation::{Standpoint, point_in_view, point_in_window};
 use super::theme;
+use crate::config;
 use crate::document::edits::{Edit, EnvironmentEdit, Part};
 use crate::document::{Document, Gesture, sidecar};
 use crate::pick::Picker;
@@ -58,6 +60,8 @@ pub struct Editor {
     outline: Option<(OutlineOf, Vec<Segment>)>,
     source: Source,
     sidecar: PathBuf,
+    /// The file there could not be read: it is put aside before another is written.
+    is_unreadable: bool,
     message: Option<Message>,
 }
 
@@ -67,13 +71,17 @@ impl Editor {
         let mut editor = Self::new(source, loaded);
         if editor.sidecar.exists() {
             editor.message = Some(match editor.document.load_edits(&editor.sidecar) {
-                Ok(left_out) if left_out.is_empty() => {
+                Ok(absent) if absent.is_empty() => {
                     Message::now(format!("with the edits of {}", editor.sidecar.display()), false)
                 }
-                Ok(left_out) => {
-                    Message::now(format!("edits of parts that the scene lacks: {}", left_out.join(", ")), true)
+                Ok(absent) => {
+                    let parts = absent.join(", ");
+                    Message::now(format!("edits of parts that the scene lacks are kept for them: {parts}"), true)
                 }
-                Err(reason) => Message::now(reason, true),
+                Err(reason) => {
+                    editor.is_unreadable = true;
+                    Message::now(reason, true)
+                }
             });
         }
         editor
@@ -94,6 +102,7 @@ impl Editor {
             message: None,
             source: source.clone(),
             sidecar,
+            is_unreadable: false,
         }
     }
 
@@ -109,13 +118,13 @@ impl Editor {
 
     /// Goes on from a newer version of the file.
     pub fn follow_file(&mut self, loaded: &Loaded) {
-        let (selected, dropped) = self.document.follow_file(loaded, self.panel.selected);
+        let (selected, gone) = self.document.follow_file(loaded, self.panel.selected);
         self.panel.selected = selected;
         self.drag = None;
-        self.message = Some(if dropped.is_empty() {
+        self.message = Some(if gone.is_empty() {
             Message::now("read again: the file has changed".into(), false)
         } else {
-            Message::now(format!("read again; gone with their edits: {}", dropped.join(", ")), true)
+            Message::now(format!("read again; gone, and their edits are kept for them: {}", gone.join(", ")), true)
         });
     }
 
@@ -263,10 +272,10 @@ impl Editor {
             Action::Solo(node) => self.document.set_solo(node),
             Action::Undo => self.document.undo(),
             Action::Redo => self.document.redo(),
-            Action::Save => {
+            Action::Save if self.document.is_unsaved() => {
                 self.save();
             }
-            Action::Camera(_) => {}
+            Action::Save | Action::Camera(_) => {}
         }
     }
 
@@ -297,14 +306,31 @@ impl Editor {
 
     /// Saves the edits to a file; only the one beside the scene is read again with it.
     pub fn save_as(&mut self, path: &Path) -> bool {
-        let is_sidecar = path == self.sidecar;
-        let saved = if is_sidecar { self.document.save_edits(path) } else { self.document.copy_edits(path) };
+        let saved = self.write(path);
         let is_saved = saved.is_ok();
         self.message = Some(match saved {
-            Ok(()) => Message::now(format!("saved {}", path.display()), false),
-            Err(error) => Message::now(error.to_string(), true),
+            Ok(None) => Message::now(format!("saved {}", path.display()), false),
+            Ok(Some(aside)) => {
+                let aside = aside.display();
+                Message::now(format!("saved {}; the file that could not be read is now {aside}", path.display()), true)
+            }
+            Err(error) => Message::now(format!("{error:#}"), true),
         });
         is_saved
+    }
+
+    /// Writes a file of edits; where one that could not be read is now.
+    fn write(&mut self, path: &Path) -> anyhow::Result<Option<PathBuf>> {
+        if path != self.sidecar {
+            self.document.copy_edits(path)?;
+            return Ok(None);
+        }
+        let aside = (self.is_unreadable && path.exists())
+            .then(|| config::put_aside(path).with_context(|| format!("{}: cannot be put aside", path.display())))
+            .transpose()?;
+        self.is_unreadable = false;
+        self.document.save_edits(path)?;
+        Ok(aside)
     }
 
     /// Hides what is selected.
@@ -348,5 +374,43 @@ impl Editor {
             "can_undo": self.document.can_undo(),
             "message": self.message.as_ref().map(|message| message.text.as_str()),
         })
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+
+    /// The built-in scene as a file of a new folder.
+    fn room(name: &str) -> (PathBuf, Source, Loaded) {
+        let folder = std::env::temp_dir().join(format!("fovea-editor-{name}-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&folder);
+        std::fs::create_dir_all(&folder).unwrap();
+        let args = crate::cli::parse(["fovea".into()]).unwrap().preview;
+        let source = Source::File(folder.join("room.glb"));
+        (folder, source, crate::session::load(&Source::BuiltIn, &args.scene).unwrap())
+    }
+
+    #[test]
+    fn a_file_of_edits_that_cannot_be_read_is_put_aside_before_another_is_written() {
+        let (folder, source, loaded) = room("unreadable");
+        let sidecar = folder.join("room.glb.fovea.json");
+        let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
+        for (text, aside) in [("{ \"format\"", "room.glb.fovea.broken.json"), ("[]", "room.glb.fovea.broken-2.json")] {
+            std::fs::write(&sidecar, text).unwrap();
+            let mut editor = Editor::open(&source, &loaded);
+            editor.act(Action::Save);
+            assert_eq!(read("room.glb.fovea.json"), text, "there is nothing to save");
+            for (node, message) in [(0, aside), (1, "saved")] {
+                let hide = Edit::Hide(editor.document.tree().roots[node], true);
+                editor.act(Action::Edit(hide, Gesture::Once));
+                editor.act(Action::Save);
+                assert!(editor.message().unwrap().text.contains(message), "{:?}", editor.message());
+                assert_eq!(read(aside), text, "the edits of another file stay where they are");
+            }
+            assert_eq!(Editor::open(&source, &loaded).document.edits(), editor.document.edits());
+        }
+        std::fs::remove_dir_all(folder).unwrap();
     }
 }
