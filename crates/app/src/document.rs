@@ -147,7 +147,8 @@ impl Document {
 
     /// Whether a node is shown.
     pub fn is_visible(&self, node: u32) -> bool {
-        apply::is_visible(node, true, &self.tree, &self.edits, self.solo)
+        let in_file = self.tree.is_shown_in_file(node);
+        apply::is_visible(node, in_file, &self.tree, &self.edits, self.solo)
     }
 
     /// What takes a point of the file's world to where it is now, for what hangs on a node.
@@ -163,7 +164,13 @@ impl Document {
     /// Makes an edit.
     pub fn edit(&mut self, edit: &Edit, gesture: Gesture) {
         let mut edits = self.edits.clone();
-        edits.make(edit);
+        match edit {
+            // A group that is shown as in the file again does not show what the file hides of it.
+            Edit::Hide(node, hidden) if apply::is_usually_visible(*node, &self.tree, &edits) != *hidden => {
+                edits.show_as_in_file(*node);
+            }
+            _ => edits.make(edit),
+        }
         // A gesture begins with its first change, not with a pointer that has not moved yet.
         if edits == self.edits {
             return;

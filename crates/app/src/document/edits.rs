@@ -195,6 +195,18 @@ impl Edits {
             }
             Edit::Reset(Part::Environment) => self.environment = EnvironmentEdit::default(),
         }
+        self.forget_what_is_usual();
+    }
+
+    /// Leaves to the file whether a node is shown.
+    pub fn show_as_in_file(&mut self, node: u32) {
+        if let Some(edit) = self.nodes.get_mut(&node) {
+            edit.hidden = None;
+        }
+        self.forget_what_is_usual();
+    }
+
+    fn forget_what_is_usual(&mut self) {
         self.nodes.retain(|_, edit| *edit != NodeEdit::default());
         self.lights.retain(|_, edit| *edit != LightEdit::default());
     }

@@ -160,6 +160,54 @@ fn hiding_solo_and_showing_go_down_the_tree() {
 }
 
 #[test]
+fn what_the_file_hides_is_shown_as_hidden_and_hiding_and_showing_leaves_no_trace() {
+    let (mut loaded, parent, child) = family();
+    let mut scene = (*loaded.scene).clone();
+    let other = scene.instances.iter().find(|instance| instance.node != child).unwrap().node;
+    loaded.nodes[other as usize].parent = Some(parent);
+    scene.instances.iter_mut().filter(|instance| instance.node == child).for_each(|hidden| hidden.visible = false);
+    loaded.scene = Arc::new(scene);
+    let mut document = Document::new(&loaded);
+    let shown = |document: &Document| {
+        let placed = document.version().instances.iter().find(|instance| instance.node == child).unwrap();
+        assert_eq!(placed.visible, document.is_visible(child), "the box says what is seen");
+        [parent, child, other].map(|node| document.is_visible(node))
+    };
+    assert_eq!(shown(&document), [true, false, true]);
+    // Each box off and on, or on and off, is as in the file again.
+    for node in [parent, child, other] {
+        let visible = document.is_visible(node);
+        document.edit(&Edit::Hide(node, visible), Gesture::Once);
+        assert_eq!(document.is_visible(node), !visible);
+        shown(&document);
+        document.edit(&Edit::Hide(node, !visible), Gesture::Once);
+        assert_eq!(shown(&document), [true, false, true]);
+        assert!(document.edits().is_empty(), "{:?}", document.edits());
+    }
+    document.edit(&Edit::Hide(child, true), Gesture::Once);
+    assert!(document.edits().is_empty(), "it is hidden already");
+    // What a group shows can be hidden below it, and shown again.
+    document.edit(&Edit::Hide(child, false), Gesture::Once);
+    document.edit(&Edit::Hide(parent, true), Gesture::Once);
+    assert_eq!(shown(&document), [false; 3]);
+    document.edit(&Edit::ShowAll, Gesture::Once);
+    assert_eq!(shown(&document), [true; 3]);
+
+    // A group of which the file shows nothing.
+    let mut scene = (*loaded.scene).clone();
+    scene.instances.iter_mut().for_each(|instance| instance.visible = false);
+    let mut document = Document::new(&Loaded { scene: Arc::new(scene), ..loaded });
+    assert_eq!(shown(&document), [false; 3]);
+    document.edit(&Edit::Hide(parent, false), Gesture::Once);
+    assert_eq!(shown(&document), [true; 3]);
+    document.edit(&Edit::Hide(child, true), Gesture::Once);
+    assert_eq!(shown(&document), [true, false, true]);
+    document.edit(&Edit::Hide(child, false), Gesture::Once);
+    document.edit(&Edit::Hide(parent, true), Gesture::Once);
+    assert_eq!((shown(&document), document.edits().is_empty()), ([false; 3], true));
+}
+
+#[test]
 fn nonsense_leaves_a_scene_that_can_be_traced() {
     let (loaded, parent, child) = family();
     let mut document = Document::new(&loaded);
