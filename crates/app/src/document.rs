@@ -177,6 +177,18 @@ impl Document {
         }
         let goes_on = self.gesture == Some(edit.target());
         self.gesture = (gesture == Gesture::GoesOn).then_some(edit.target());
+        self.change(edits, goes_on);
+    }
+
+    /// Puts other edits in the place of all, as one step.
+    pub fn replace(&mut self, edits: Edits) {
+        self.end_gesture();
+        if edits != self.edits {
+            self.change(edits, false);
+        }
+    }
+
+    fn change(&mut self, edits: Edits, goes_on: bool) {
         let before = std::mem::replace(&mut self.edits, edits);
         if !goes_on {
             if self.undo.len() == MOST_STEPS {

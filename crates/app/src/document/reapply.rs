@@ -77,8 +77,12 @@ impl<'a> List<'a> {
         let present = edits.iter().filter_map(|(index, edit)| Some((self.from.get(*index as usize)?, edit)));
         for (name, edit) in absent.iter().chain(present) {
             match self.to.get(name) {
-                Some(place) => drop(here.insert(*place, edit.clone())),
-                None => drop(gone.insert(name.clone(), edit.clone())),
+                Some(place) => {
+                    here.insert(*place, edit.clone());
+                }
+                None => {
+                    gone.insert(name.clone(), edit.clone());
+                }
             }
         }
         (here, gone)

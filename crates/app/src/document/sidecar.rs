@@ -25,10 +25,13 @@ const VERSION: u64 = 1;
 /// A backdrop that is the environment.
 const ENVIRONMENT: &str = "environment";
 
+/// How the names of such files end.
+pub const ENDING: &str = ".fovea.json";
+
 /// Where the edits of a scene are kept.
 pub fn path_for(scene: &Path) -> PathBuf {
     let mut name = scene.as_os_str().to_owned();
-    name.push(".fovea.json");
+    name.push(ENDING);
     PathBuf::from(name)
 }
 
@@ -70,11 +73,26 @@ impl Document {
     /// # Errors
     /// One line, when the file cannot be read or is no file of edits.
     pub fn load_edits(&mut self, path: &Path) -> Result<Vec<String>, String> {
-        let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
-        let edits = parse(&text, &self.names).map_err(|reason| format!("{}: {reason}", path.display()))?;
+        let edits = self.read_edits(path)?;
         let absent = edits.absent.parts();
         self.take_saved(edits);
         Ok(absent)
+    }
+
+    /// The same in place of the present edits, as one step to undo; they count as unsaved.
+    ///
+    /// # Errors
+    /// As of [`Document::load_edits`].
+    pub fn open_edits(&mut self, path: &Path) -> Result<Vec<String>, String> {
+        let edits = self.read_edits(path)?;
+        let absent = edits.absent.parts();
+        self.replace(edits);
+        Ok(absent)
+    }
+
+    fn read_edits(&self, path: &Path) -> Result<Edits, String> {
+        let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        parse(&text, &self.names).map_err(|reason| format!("{}: {reason}", path.display()))
     }
 }
 
@@ -227,8 +245,12 @@ fn list<T>(list: &Json, names: &[PartName], edit: impl Fn(&Json) -> T) -> (BTree
         let occurrence = entry["occurrence"].as_u64().unwrap_or(0);
         let name = PartName { name, occurrence: u32::try_from(occurrence).unwrap_or(u32::MAX) };
         match names.iter().zip(0..).find(|(part, _)| **part == name) {
-            Some((_, index)) => drop(present.insert(index, edit(entry))),
-            None => drop(absent.insert(name, edit(entry))),
+            Some((_, index)) => {
+                present.insert(index, edit(entry));
+            }
+            None => {
+                absent.insert(name, edit(entry));
+            }
         }
     }
     (present, absent)

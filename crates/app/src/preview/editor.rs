@@ -70,19 +70,9 @@ impl Editor {
     pub fn open(source: &Source, loaded: &Loaded) -> Self {
         let mut editor = Self::new(source, loaded);
         if editor.sidecar.exists() {
-            editor.message = Some(match editor.document.load_edits(&editor.sidecar) {
-                Ok(absent) if absent.is_empty() => {
-                    Message::now(format!("with the edits of {}", editor.sidecar.display()), false)
-                }
-                Ok(absent) => {
-                    let parts = absent.join(", ");
-                    Message::now(format!("edits of parts that the scene lacks are kept for them: {parts}"), true)
-                }
-                Err(reason) => {
-                    editor.is_unreadable = true;
-                    Message::now(reason, true)
-                }
-            });
+            let taken = editor.document.load_edits(&editor.sidecar);
+            editor.is_unreadable = taken.is_err();
+            editor.message = Some(message_of(&editor.sidecar, taken));
         }
         editor
     }
@@ -114,6 +104,17 @@ impl Editor {
     /// Where the scene comes from.
     pub fn source(&self) -> &Source {
         &self.source
+    }
+
+    /// The file beside the scene that its edits are saved to.
+    pub fn sidecar(&self) -> &Path {
+        &self.sidecar
+    }
+
+    /// Puts the edits of a file in place of the present ones, as one step to undo.
+    pub fn open_edits(&mut self, path: &Path) {
+        let taken = self.document.open_edits(path);
+        self.message = Some(message_of(path, taken));
     }
 
     /// Goes on from a newer version of the file.
@@ -321,7 +322,9 @@ impl Editor {
 
     /// Writes a file of edits; where one that could not be read is now.
     fn write(&mut self, path: &Path) -> anyhow::Result<Option<PathBuf>> {
-        if path != self.sidecar {
+        // A dialog names files from the root.
+        let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        if absolute(path) != absolute(&self.sidecar) {
             self.document.copy_edits(path)?;
             return Ok(None);
         }
@@ -377,6 +380,18 @@ impl Editor {
     }
 }
 
+/// What to say of a file of edits that was read.
+fn message_of(path: &Path, absent: Result<Vec<String>, String>) -> Message {
+    match absent {
+        Ok(absent) if absent.is_empty() => Message::now(format!("with the edits of {}", path.display()), false),
+        Ok(absent) => {
+            let parts = absent.join(", ");
+            Message::now(format!("edits of parts that the scene lacks are kept for them: {parts}"), true)
+        }
+        Err(reason) => Message::now(reason, true),
+    }
+}
+
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
@@ -411,6 +426,34 @@ mod tests {
             }
             assert_eq!(Editor::open(&source, &loaded).document.edits(), editor.document.edits());
         }
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn edits_of_another_file_are_opened_in_one_step() {
+        let (folder, source, loaded) = room("opened");
+        let mut editor = Editor::open(&source, &loaded);
+        let roots = editor.document.tree().roots.clone();
+        let hide = |editor: &mut Editor, place: usize| {
+            editor.act(Action::Edit(Edit::Hide(roots[place], true), Gesture::Once));
+        };
+        (0..2).for_each(|place| hide(&mut editor, place));
+        let copy = folder.join("other.fovea.json");
+        assert!(editor.save_as(&copy) && editor.document.is_unsaved(), "a copy is not read again");
+        let copied = editor.document.edits().clone();
+        let mut editor = Editor::open(&source, &loaded);
+        hide(&mut editor, 2);
+        let before = editor.document.edits().clone();
+        editor.open_edits(&copy);
+        assert_eq!((editor.document.edits(), editor.document.is_unsaved()), (&copied, true));
+        editor.act(Action::Undo);
+        assert_eq!(editor.document.edits(), &before);
+        editor.act(Action::Redo);
+        assert_eq!(editor.document.edits(), &copied);
+        std::fs::write(&copy, "{").unwrap();
+        editor.open_edits(&copy);
+        assert!(editor.message().unwrap().wrong);
+        assert_eq!(editor.document.edits(), &copied, "what is no file of edits changes nothing");
         std::fs::remove_dir_all(folder).unwrap();
     }
 }
