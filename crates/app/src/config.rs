@@ -34,6 +34,18 @@ pub fn read(path: &Path) -> Result<Value, String> {
     serde_json::from_str(&text).map_err(|error| format!("{}: {error}", path.display()))
 }
 
+/// Renames a file that makes no sense to this program, so that whoever wrote it still has it; its new name, which no other
+/// file had.
+///
+/// # Errors
+/// When it cannot be renamed.
+pub fn put_aside(path: &Path) -> std::io::Result<PathBuf> {
+    let numbered = (2_u32..).map(|number| path.with_extension(format!("broken-{number}.json")));
+    let mut names = std::iter::once(path.with_extension("broken.json")).chain(numbered);
+    let aside = names.find(|name| !name.exists()).ok_or(std::io::ErrorKind::AlreadyExists)?;
+    std::fs::rename(path, &aside).map(|()| aside)
+}
+
 /// Puts a value in the file's place in one step, so that an interrupted write leaves the old file.
 ///
 /// # Errors

@@ -2,7 +2,7 @@
 //!
 //! A document makes immutable [`Scene`] versions and never changes one. Edits are values ([`Edits`]); undo puts earlier
 //! ones back. When the file changes on disk, the edits are put onto the new version wherever a part of the same name is
-//! still there.
+//! still there; those of other parts wait until theirs are back.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -147,7 +147,8 @@ impl Document {
 
     /// Whether a node is shown.
     pub fn is_visible(&self, node: u32) -> bool {
-        apply::is_visible(node, true, &self.tree, &self.edits, self.solo)
+        let in_file = self.tree.is_shown_in_file(node);
+        apply::is_visible(node, in_file, &self.tree, &self.edits, self.solo)
     }
 
     /// What takes a point of the file's world to where it is now, for what hangs on a node.
@@ -163,13 +164,31 @@ impl Document {
     /// Makes an edit.
     pub fn edit(&mut self, edit: &Edit, gesture: Gesture) {
         let mut edits = self.edits.clone();
-        edits.make(edit);
+        match edit {
+            // A group that is shown as in the file again does not show what the file hides of it.
+            Edit::Hide(node, hidden) if apply::is_usually_visible(*node, &self.tree, &edits) != *hidden => {
+                edits.show_as_in_file(*node);
+            }
+            _ => edits.make(edit),
+        }
         // A gesture begins with its first change, not with a pointer that has not moved yet.
         if edits == self.edits {
             return;
         }
         let goes_on = self.gesture == Some(edit.target());
         self.gesture = (gesture == Gesture::GoesOn).then_some(edit.target());
+        self.change(edits, goes_on);
+    }
+
+    /// Puts other edits in the place of all, as one step.
+    pub fn replace(&mut self, edits: Edits) {
+        self.end_gesture();
+        if edits != self.edits {
+            self.change(edits, false);
+        }
+    }
+
+    fn change(&mut self, edits: Edits, goes_on: bool) {
         let before = std::mem::replace(&mut self.edits, edits);
         if !goes_on {
             if self.undo.len() == MOST_STEPS {
@@ -239,22 +258,23 @@ impl Document {
     }
 
     /// Goes on from a newer version of the file. What is selected is named by its new index, if it is still there; edits
-    /// of parts that are gone are dropped, and named.
+    /// of parts that are gone wait for them, and the parts are named.
     pub fn follow_file(&mut self, loaded: &Loaded, selected: Option<Part>) -> (Option<Part>, Vec<String>) {
         let names = Names::of(&loaded.scene, &loaded.nodes);
         let places = reapply::Places::new(&self.names, &names);
-        let dropped = places.missing(&self.edits, &self.names);
+        let gone = places.missing(&self.edits);
         for edits in self.undo.iter_mut().chain(&mut self.redo).chain([&mut self.edits, &mut self.saved]) {
             *edits = places.of_edits(edits);
         }
         self.solo = self.solo.and_then(|node| places.node(node));
+        let selected = selected.and_then(|part| places.part(part));
         self.file = Arc::new((*loaded.scene).clone().sharing_parts_of(&self.file));
         self.tree = Tree::new(&loaded.nodes, &self.file);
         self.nodes = tree::with_pivots(&loaded.nodes, &self.tree, &self.file);
         self.names = names;
         self.end_gesture();
         self.remake();
-        (selected.and_then(|part| places.part(part)), dropped)
+        (selected, gone)
     }
 
     fn remake(&mut self) {

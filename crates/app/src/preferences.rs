@@ -148,7 +148,7 @@ impl Store {
             Ok(value) => (value, None),
             Err(reason) => {
                 // Put aside for whoever wrote it by hand; where that fails it will be said again next time.
-                let _ = std::fs::rename(path, path.with_extension("broken.json"));
+                let _ = config::put_aside(path);
                 (Value::Null, Some(format!("{reason}; the window's settings start afresh")))
             }
         };

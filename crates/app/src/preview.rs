@@ -51,6 +51,7 @@ pub mod seeing;
 pub mod split_panel;
 pub mod theme;
 pub mod tracing;
+pub mod unsaved;
 pub mod versions;
 pub mod window;
 

@@ -463,6 +463,7 @@ fn the_menu_of_files_opens_saves_and_changes_the_theme() {
         ("Open scene…", Purpose::Scene),
         ("Open environment…", Purpose::Environment),
         ("Go on with a film…", Purpose::Film),
+        ("Open edits…", Purpose::Edits),
         ("Save picture as…", Purpose::SavePicture),
         ("Save film as…", Purpose::SaveFilm),
         ("Save edits as…", Purpose::SaveEdits),

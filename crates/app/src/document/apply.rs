@@ -75,6 +75,12 @@ pub fn is_visible(node: u32, in_file: bool, tree: &Tree, edits: &Edits, solo: Op
     shown
 }
 
+/// Whether a node that hangs on nothing hidden is shown without an edit of its own visibility.
+pub fn is_usually_visible(node: u32, tree: &Tree, edits: &Edits) -> bool {
+    let shows = |above: u32| edits.nodes.get(&above).is_some_and(|edit| edit.hidden == Some(false));
+    tree.is_shown_in_file(node) || tree.line(node).skip(1).any(shows)
+}
+
 /// Images of environments that have been loaded, by file.
 pub trait Environments {
     /// The image of a file, once it is loaded.

@@ -7,6 +7,7 @@ use glam::{Quat, Vec3};
 use tracer::scene::Backdrop;
 
 use super::parameters::{MaterialParameter, Value};
+use super::tree::PartName;
 
 /// How a node is moved, turned and scaled against its place in the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,6 +61,27 @@ pub struct EnvironmentEdit {
     pub backdrop: Option<Backdrop>,
 }
 
+/// Edits of parts that the file lacks at present, by name. They are saved with the others and wait for their parts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Absent {
+    /// Of nodes.
+    pub nodes: BTreeMap<PartName, NodeEdit>,
+    /// Of materials.
+    pub materials: BTreeMap<PartName, BTreeMap<MaterialParameter, Value>>,
+    /// Of lights.
+    pub lights: BTreeMap<PartName, LightEdit>,
+}
+
+impl Absent {
+    /// The parts, in words.
+    pub fn parts(&self) -> Vec<String> {
+        let nodes = self.nodes.keys().map(|name| name.part("object"));
+        let materials = self.materials.keys().map(|name| name.part("material"));
+        let lights = self.lights.keys().map(|name| name.part("light"));
+        nodes.chain(materials).chain(lights).collect()
+    }
+}
+
 /// All that differs from the file. Parts are named by their index in it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Edits {
@@ -71,6 +93,8 @@ pub struct Edits {
     pub lights: BTreeMap<u32, LightEdit>,
     /// The environment.
     pub environment: EnvironmentEdit,
+    /// What is not in the file at present.
+    pub absent: Absent,
 }
 
 /// One change that a person makes.
@@ -171,6 +195,18 @@ impl Edits {
             }
             Edit::Reset(Part::Environment) => self.environment = EnvironmentEdit::default(),
         }
+        self.forget_what_is_usual();
+    }
+
+    /// Leaves to the file whether a node is shown.
+    pub fn show_as_in_file(&mut self, node: u32) {
+        if let Some(edit) = self.nodes.get_mut(&node) {
+            edit.hidden = None;
+        }
+        self.forget_what_is_usual();
+    }
+
+    fn forget_what_is_usual(&mut self) {
         self.nodes.retain(|_, edit| *edit != NodeEdit::default());
         self.lights.retain(|_, edit| *edit != LightEdit::default());
     }

@@ -4,6 +4,7 @@
 //! properties), and the next export of the scene's own program would overwrite it. The sidecar outlives both, since parts
 //! are found by name. Lengths are metres, angles degrees, colours linear Rec. 709.
 
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -24,10 +25,13 @@ const VERSION: u64 = 1;
 /// A backdrop that is the environment.
 const ENVIRONMENT: &str = "environment";
 
+/// How the names of such files end.
+pub const ENDING: &str = ".fovea.json";
+
 /// Where the edits of a scene are kept.
 pub fn path_for(scene: &Path) -> PathBuf {
     let mut name = scene.as_os_str().to_owned();
-    name.push(".fovea.json");
+    name.push(ENDING);
     PathBuf::from(name)
 }
 
@@ -54,40 +58,64 @@ impl Document {
     /// The edits as one JSON object.
     pub fn to_json(&self) -> Json {
         let edits = self.edits();
-        let named = |names: &[PartName], index: u32, edit: Map<String, Json>| {
-            let name = names.get(index as usize);
-            let mut object = Map::new();
-            object.insert("name".into(), json!(name.map_or("", |name| name.name.as_str())));
-            object.insert("occurrence".into(), json!(name.map_or(index, |name| name.occurrence)));
-            object.extend(edit);
-            Json::Object(object)
-        };
-        let nodes = edits.nodes.iter().map(|(node, edit)| named(&self.names.nodes, *node, node_json(edit)));
-        let materials = edits.materials.iter().map(|(material, values)| {
-            let values = values.iter().map(|(parameter, value)| (parameter.key().to_owned(), value_json(*value)));
-            named(&self.names.materials, *material, values.collect())
-        });
-        let lights = edits.lights.iter().map(|(light, edit)| named(&self.names.lights, *light, light_json(edit)));
         json!({
             "format": FORMAT,
             "version": VERSION,
-            "nodes": nodes.collect::<Vec<_>>(),
-            "materials": materials.collect::<Vec<_>>(),
-            "lights": lights.collect::<Vec<_>>(),
+            "nodes": list_json(&edits.nodes, &self.names.nodes, &edits.absent.nodes, node_json),
+            "materials": list_json(&edits.materials, &self.names.materials, &edits.absent.materials, material_json),
+            "lights": list_json(&edits.lights, &self.names.lights, &edits.absent.lights, light_json),
             "environment": environment_json(&edits.environment),
         })
     }
 
-    /// Takes the edits of a file; what names no part of this scene is left out and named.
+    /// Takes the edits of a file; what names no part of this scene waits for it and is named.
     ///
     /// # Errors
     /// One line, when the file cannot be read or is no file of edits.
     pub fn load_edits(&mut self, path: &Path) -> Result<Vec<String>, String> {
-        let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
-        let (edits, left_out) = parse(&text, &self.names).map_err(|reason| format!("{}: {reason}", path.display()))?;
+        let edits = self.read_edits(path)?;
+        let absent = edits.absent.parts();
         self.take_saved(edits);
-        Ok(left_out)
+        Ok(absent)
     }
+
+    /// The same in place of the present edits, as one step to undo; they count as unsaved.
+    ///
+    /// # Errors
+    /// As of [`Document::load_edits`].
+    pub fn open_edits(&mut self, path: &Path) -> Result<Vec<String>, String> {
+        let edits = self.read_edits(path)?;
+        let absent = edits.absent.parts();
+        self.replace(edits);
+        Ok(absent)
+    }
+
+    fn read_edits(&self, path: &Path) -> Result<Edits, String> {
+        let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
+        parse(&text, &self.names).map_err(|reason| format!("{}: {reason}", path.display()))
+    }
+}
+
+fn list_json<T>(
+    edits: &BTreeMap<u32, T>,
+    names: &[PartName],
+    absent: &BTreeMap<PartName, T>,
+    json: impl Fn(&T) -> Map<String, Json>,
+) -> Json {
+    let name = |index: u32| {
+        let unnamed = || PartName { name: String::new(), occurrence: index };
+        names.get(index as usize).cloned().unwrap_or_else(unnamed)
+    };
+    let present = edits.iter().map(|(index, edit)| (name(*index), edit));
+    let all = present.chain(absent.iter().map(|(name, edit)| (name.clone(), edit)));
+    let named = all.map(|(PartName { name, occurrence }, edit)| {
+        let mut object = Map::new();
+        object.insert("name".into(), json!(name));
+        object.insert("occurrence".into(), json!(occurrence));
+        object.extend(json(edit));
+        Json::Object(object)
+    });
+    Json::Array(named.collect())
 }
 
 fn node_json(edit: &NodeEdit) -> Map<String, Json> {
@@ -102,6 +130,10 @@ fn node_json(edit: &NodeEdit) -> Map<String, Json> {
         object.insert("hidden".into(), json!(hidden));
     }
     object
+}
+
+fn material_json(values: &BTreeMap<MaterialParameter, Value>) -> Map<String, Json> {
+    values.iter().map(|(parameter, value)| (parameter.key().to_owned(), value_json(*value))).collect()
 }
 
 fn value_json(value: Value) -> Json {
@@ -147,8 +179,8 @@ fn environment_json(edit: &EnvironmentEdit) -> Json {
     Json::Object(object)
 }
 
-/// Edits for the parts of these names, and what names none of them.
-fn parse(text: &str, names: &Names) -> Result<(Edits, Vec<String>), String> {
+/// Edits for the parts of these names.
+fn parse(text: &str, names: &Names) -> Result<Edits, String> {
     let json: Json = serde_json::from_str(text).map_err(|error| format!("no file of edits: {error}"))?;
     if json["format"] != FORMAT {
         return Err(format!("no file of edits: its format is not \"{FORMAT}\""));
@@ -156,26 +188,10 @@ fn parse(text: &str, names: &Names) -> Result<(Edits, Vec<String>), String> {
     if json["version"] != VERSION {
         return Err(format!("edits of version {}; this program reads version {VERSION}", json["version"]));
     }
-    let (mut edits, mut left_out) = (Edits::default(), Vec::new());
-    for (entry, index) in entries(&json["nodes"], &names.nodes, "object", &mut left_out) {
-        edits.nodes.insert(index, node_edit(entry));
-    }
-    for (entry, index) in entries(&json["materials"], &names.materials, "material", &mut left_out) {
-        let values = MaterialParameter::ALL.into_iter().filter_map(|parameter| {
-            let value = &entry[parameter.key()];
-            let value = vector(value).map(Value::Color).or_else(|| number(value).map(Value::Number))?;
-            Some((parameter, value))
-        });
-        edits.materials.insert(index, values.collect());
-    }
-    for (entry, index) in entries(&json["lights"], &names.lights, "light", &mut left_out) {
-        let edit = LightEdit {
-            intensity: vector(&entry["intensity"]),
-            angle: number(&entry["angle_deg"]).map(f32::to_radians),
-            translation: vector(&entry["translation_m"]).unwrap_or_default(),
-        };
-        edits.lights.insert(index, edit);
-    }
+    let mut edits = Edits::default();
+    (edits.nodes, edits.absent.nodes) = list(&json["nodes"], &names.nodes, node_edit);
+    (edits.materials, edits.absent.materials) = list(&json["materials"], &names.materials, material_edit);
+    (edits.lights, edits.absent.lights) = list(&json["lights"], &names.lights, light_edit);
     let environment = &json["environment"];
     edits.environment = EnvironmentEdit {
         image: environment["image"].as_str().map(PathBuf::from),
@@ -187,7 +203,7 @@ fn parse(text: &str, names: &Names) -> Result<(Edits, Vec<String>), String> {
             color => vector(color).map(Backdrop::Color),
         },
     };
-    Ok((edits, left_out))
+    Ok(edits)
 }
 
 fn node_edit(entry: &Json) -> NodeEdit {
@@ -204,19 +220,40 @@ fn node_edit(entry: &Json) -> NodeEdit {
     NodeEdit { moved: moved.sane(), hidden: entry["hidden"].as_bool() }
 }
 
-/// The entries of a list that name a part, with its place.
-fn entries<'a>(list: &'a Json, names: &[PartName], kind: &str, left_out: &mut Vec<String>) -> Vec<(&'a Json, u32)> {
-    let mut found = Vec::new();
-    for entry in list.as_array().into_iter().flatten() {
-        let name = entry["name"].as_str().unwrap_or_default();
+fn material_edit(entry: &Json) -> BTreeMap<MaterialParameter, Value> {
+    let values = MaterialParameter::ALL.into_iter().filter_map(|parameter| {
+        let value = &entry[parameter.key()];
+        let value = vector(value).map(Value::Color).or_else(|| number(value).map(Value::Number))?;
+        Some((parameter, value))
+    });
+    values.collect()
+}
+
+fn light_edit(entry: &Json) -> LightEdit {
+    LightEdit {
+        intensity: vector(&entry["intensity"]),
+        angle: number(&entry["angle_deg"]).map(f32::to_radians),
+        translation: vector(&entry["translation_m"]).unwrap_or_default(),
+    }
+}
+
+/// The edits of a list by the places of the parts that they name, and by name where there are none.
+fn list<T>(list: &Json, names: &[PartName], edit: impl Fn(&Json) -> T) -> (BTreeMap<u32, T>, BTreeMap<PartName, T>) {
+    let (mut present, mut absent) = (BTreeMap::new(), BTreeMap::new());
+    for entry in list.as_array().into_iter().flatten().filter(|entry| entry.is_object()) {
+        let name = entry["name"].as_str().unwrap_or_default().to_owned();
         let occurrence = entry["occurrence"].as_u64().unwrap_or(0);
-        let fits = |part: &PartName| part.name == name && u64::from(part.occurrence) == occurrence;
-        match names.iter().zip(0..).find(|(part, _)| fits(part)) {
-            Some((_, index)) => found.push((entry, index)),
-            None => left_out.push(format!("{kind} '{}'", name.replace(['\n', '\r'], " "))),
+        let name = PartName { name, occurrence: u32::try_from(occurrence).unwrap_or(u32::MAX) };
+        match names.iter().zip(0..).find(|(part, _)| **part == name) {
+            Some((_, index)) => {
+                present.insert(index, edit(entry));
+            }
+            None => {
+                absent.insert(name, edit(entry));
+            }
         }
     }
-    found
+    (present, absent)
 }
 
 fn number(value: &Json) -> Option<f32> {

@@ -160,6 +160,54 @@ fn hiding_solo_and_showing_go_down_the_tree() {
 }
 
 #[test]
+fn what_the_file_hides_is_shown_as_hidden_and_hiding_and_showing_leaves_no_trace() {
+    let (mut loaded, parent, child) = family();
+    let mut scene = (*loaded.scene).clone();
+    let other = scene.instances.iter().find(|instance| instance.node != child).unwrap().node;
+    loaded.nodes[other as usize].parent = Some(parent);
+    scene.instances.iter_mut().filter(|instance| instance.node == child).for_each(|hidden| hidden.visible = false);
+    loaded.scene = Arc::new(scene);
+    let mut document = Document::new(&loaded);
+    let shown = |document: &Document| {
+        let placed = document.version().instances.iter().find(|instance| instance.node == child).unwrap();
+        assert_eq!(placed.visible, document.is_visible(child), "the box says what is seen");
+        [parent, child, other].map(|node| document.is_visible(node))
+    };
+    assert_eq!(shown(&document), [true, false, true]);
+    // Each box off and on, or on and off, is as in the file again.
+    for node in [parent, child, other] {
+        let visible = document.is_visible(node);
+        document.edit(&Edit::Hide(node, visible), Gesture::Once);
+        assert_eq!(document.is_visible(node), !visible);
+        shown(&document);
+        document.edit(&Edit::Hide(node, !visible), Gesture::Once);
+        assert_eq!(shown(&document), [true, false, true]);
+        assert!(document.edits().is_empty(), "{:?}", document.edits());
+    }
+    document.edit(&Edit::Hide(child, true), Gesture::Once);
+    assert!(document.edits().is_empty(), "it is hidden already");
+    // What a group shows can be hidden below it, and shown again.
+    document.edit(&Edit::Hide(child, false), Gesture::Once);
+    document.edit(&Edit::Hide(parent, true), Gesture::Once);
+    assert_eq!(shown(&document), [false; 3]);
+    document.edit(&Edit::ShowAll, Gesture::Once);
+    assert_eq!(shown(&document), [true; 3]);
+
+    // A group of which the file shows nothing.
+    let mut scene = (*loaded.scene).clone();
+    scene.instances.iter_mut().for_each(|instance| instance.visible = false);
+    let mut document = Document::new(&Loaded { scene: Arc::new(scene), ..loaded });
+    assert_eq!(shown(&document), [false; 3]);
+    document.edit(&Edit::Hide(parent, false), Gesture::Once);
+    assert_eq!(shown(&document), [true; 3]);
+    document.edit(&Edit::Hide(child, true), Gesture::Once);
+    assert_eq!(shown(&document), [true, false, true]);
+    document.edit(&Edit::Hide(child, false), Gesture::Once);
+    document.edit(&Edit::Hide(parent, true), Gesture::Once);
+    assert_eq!((shown(&document), document.edits().is_empty()), ([false; 3], true));
+}
+
+#[test]
 fn nonsense_leaves_a_scene_that_can_be_traced() {
     let (loaded, parent, child) = family();
     let mut document = Document::new(&loaded);
@@ -259,6 +307,40 @@ fn saved_edits_are_read_back_the_same() {
     document.save_edits(&path).unwrap();
     other.load_edits(&path).unwrap();
     assert_eq!(other.edits(), document.edits());
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn edits_of_parts_that_are_gone_are_saved_and_wait_for_them() {
+    let loaded = built_in();
+    let mut document = Document::new(&loaded);
+    document.edit(&Edit::Hide(document.tree().roots[0], true), Gesture::Once);
+    document.edit(&rough(0, 0.75), Gesture::Once);
+    let edits = document.edits().clone();
+
+    // The first material has another name for a while.
+    let mut other = loaded.clone();
+    let mut scene = (*loaded.scene).clone();
+    scene.materials[0] = Arc::new(tracer::scene::Material { name: "new".into(), ..(*scene.materials[0]).clone() });
+    other.scene = Arc::new(scene);
+    document.follow_file(&other, None);
+    assert!(document.edits().materials.is_empty() && document.is_unsaved());
+    let path = std::env::temp_dir().join(format!("fovea-absent-{}.json", std::process::id()));
+    document.save_edits(&path).unwrap();
+    document.edit(&rough(1, 0.5), Gesture::Once);
+    document.undo();
+    assert!(document.follow_file(&loaded, None).1.is_empty());
+    assert_eq!((document.edits(), document.is_unsaved()), (&edits, false));
+    assert_eq!(document.version().materials[0].roughness, 0.75);
+
+    // The same by way of the file: read with the part missing, and saved again.
+    let mut document = Document::new(&other);
+    let name = &loaded.scene.materials[0].name;
+    assert_eq!(document.load_edits(&path).unwrap(), [format!("material '{name}'")]);
+    document.save_edits(&path).unwrap();
+    let mut document = Document::new(&loaded);
+    assert_eq!(document.load_edits(&path).unwrap(), Vec::<String>::new());
+    assert_eq!(document.edits(), &edits);
     std::fs::remove_file(path).unwrap();
 }
 

@@ -14,6 +14,8 @@ pub struct Tree {
     /// By node.
     children: Vec<Vec<u32>>,
     parents: Vec<Option<u32>>,
+    /// The file shows something of what hangs on the node.
+    shown: Vec<bool>,
 }
 
 impl Tree {
@@ -34,6 +36,7 @@ impl Tree {
             roots: Vec::new(),
             children: vec![Vec::new(); nodes.len()],
             parents: nodes.iter().map(|node| node.parent).collect(),
+            shown: Vec::new(),
         };
         for (index, node) in (0u32..).zip(nodes).filter(|(index, _)| kept[*index as usize]) {
             match node.parent.and_then(|parent| tree.children.get_mut(parent as usize)) {
@@ -41,7 +44,22 @@ impl Tree {
                 None => tree.roots.push(index),
             }
         }
+        let mut shown = vec![false; nodes.len()];
+        for instance in scene.instances.iter().filter(|instance| instance.visible) {
+            for node in tree.line(instance.node) {
+                match shown.get_mut(node as usize) {
+                    Some(shown) if !*shown => *shown = true,
+                    _ => break,
+                }
+            }
+        }
+        tree.shown = shown;
         tree
+    }
+
+    /// Whether the file shows a node: anything of what hangs on it.
+    pub fn is_shown_in_file(&self, node: u32) -> bool {
+        self.shown.get(node as usize).copied().unwrap_or(true)
     }
 
     /// What hangs on a node.
@@ -106,12 +124,19 @@ pub(super) fn with_pivots(nodes: &[SceneNode], tree: &Tree, scene: &Scene) -> Ve
 }
 
 /// What a part is called: its name, and which of those that share it.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct PartName {
     /// May be empty.
     pub name: String,
     /// 0 for the first of that name.
     pub occurrence: u32,
+}
+
+impl PartName {
+    /// What it is, and its name: on one line, whatever the file says.
+    pub fn part(&self, kind: &str) -> String {
+        format!("{kind} '{}'", self.name.replace(['\n', '\r'], " "))
+    }
 }
 
 /// The names of a list of parts, in order.
@@ -125,10 +150,4 @@ pub fn part_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<PartName>
             PartName { name: name.to_owned(), occurrence: *count - 1 }
         })
         .collect()
-}
-
-/// Where the parts of one list are in another, by name.
-pub fn places(from: &[PartName], to: &[PartName]) -> Vec<Option<u32>> {
-    let index: HashMap<&PartName, u32> = to.iter().zip(0..).collect();
-    from.iter().map(|name| index.get(name).copied()).collect()
 }

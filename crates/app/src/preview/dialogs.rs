@@ -22,6 +22,8 @@ pub enum Purpose {
     Environment,
     /// A film to go on with.
     Film,
+    /// Edits to put onto the scene.
+    Edits,
     /// The picture is to be saved.
     SavePicture,
     /// The film is to be saved.
@@ -37,6 +39,7 @@ impl Purpose {
             Self::Scene => ("Open a scene", "glTF scenes", &["glb", "gltf"], false),
             Self::Environment => ("Open an environment image", "HDR images", &["hdr", "exr"], false),
             Self::Film => ("Go on with a film", "Films", &["exr"], false),
+            Self::Edits => ("Open edits", "Edits", &["json"], false),
             Self::SavePicture => ("Save the picture", "PNG", &["png"], true),
             Self::SaveFilm => ("Save the film", "OpenEXR", &["exr"], true),
             Self::SaveEdits => ("Save the edits", "Edits", &["json"], true),

@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use anyhow::Context as _;
 use egui::{Color32, Context, PointerButton, Pos2, Rect, Response, Stroke, Ui};
 use glam::Vec3;
 use tracer::scene::{EnvironmentImage, Scene};
@@ -11,6 +12,7 @@ use tracer::scene::{EnvironmentImage, Scene};
 use super::engine::Message;
 use super::navigation::{Standpoint, point_in_view, point_in_window};
 use super::theme;
+use crate::config;
 use crate::document::edits::{Edit, EnvironmentEdit, Part};
 use crate::document::{Document, Gesture, sidecar};
 use crate::pick::Picker;
@@ -56,7 +58,10 @@ pub struct Editor {
     picker: Picker,
     drag: Option<Drag>,
     outline: Option<(OutlineOf, Vec<Segment>)>,
+    source: Source,
     sidecar: PathBuf,
+    /// The file there could not be read: it is put aside before another is written.
+    is_unreadable: bool,
     message: Option<Message>,
     /// The environment image that was last asked for.
     asked_environment: Option<PathBuf>,
@@ -65,27 +70,21 @@ pub struct Editor {
 impl Editor {
     /// For a scene that was opened, with the edits that were saved beside it.
     pub fn open(source: &Source, loaded: &Loaded) -> Self {
-        let sidecar = match source {
-            Source::BuiltIn => sidecar::path_for(Path::new(BUILT_IN)),
-            Source::File(path) => sidecar::path_for(path),
-        };
-        let mut editor = Self::new(loaded, sidecar);
+        let mut editor = Self::new(source, loaded);
         if editor.sidecar.exists() {
-            editor.message = Some(match editor.document.load_edits(&editor.sidecar) {
-                Ok(left_out) if left_out.is_empty() => {
-                    Message::now(format!("with the edits of {}", editor.sidecar.display()), false)
-                }
-                Ok(left_out) => {
-                    Message::now(format!("edits of parts that the scene lacks: {}", left_out.join(", ")), true)
-                }
-                Err(reason) => Message::now(reason, true),
-            });
+            let taken = editor.document.load_edits(&editor.sidecar);
+            editor.is_unreadable = taken.is_err();
+            editor.message = Some(message_of(&editor.sidecar, taken));
         }
         editor
     }
 
-    /// Without edits; they are saved to `sidecar`.
-    fn new(loaded: &Loaded, sidecar: PathBuf) -> Self {
+    /// Without edits.
+    fn new(source: &Source, loaded: &Loaded) -> Self {
+        let sidecar = match source {
+            Source::BuiltIn => sidecar::path_for(Path::new(BUILT_IN)),
+            Source::File(path) => sidecar::path_for(path),
+        };
         Self {
             document: Document::new(loaded),
             panel: PanelState::default(),
@@ -93,8 +92,10 @@ impl Editor {
             drag: None,
             outline: None,
             message: None,
+            source: source.clone(),
             sidecar,
             asked_environment: None,
+            is_unreadable: false,
         }
     }
 
@@ -103,15 +104,31 @@ impl Editor {
         &self.document
     }
 
+    /// Where the scene comes from.
+    pub fn source(&self) -> &Source {
+        &self.source
+    }
+
+    /// The file beside the scene that its edits are saved to.
+    pub fn sidecar(&self) -> &Path {
+        &self.sidecar
+    }
+
+    /// Puts the edits of a file in place of the present ones, as one step to undo.
+    pub fn open_edits(&mut self, path: &Path) {
+        let taken = self.document.open_edits(path);
+        self.message = Some(message_of(path, taken));
+    }
+
     /// Goes on from a newer version of the file.
     pub fn follow_file(&mut self, loaded: &Loaded) {
-        let (selected, dropped) = self.document.follow_file(loaded, self.panel.selected);
+        let (selected, gone) = self.document.follow_file(loaded, self.panel.selected);
         self.panel.selected = selected;
         self.drag = None;
-        self.message = Some(if dropped.is_empty() {
+        self.message = Some(if gone.is_empty() {
             Message::now("read again: the file has changed".into(), false)
         } else {
-            Message::now(format!("read again; gone with their edits: {}", dropped.join(", ")), true)
+            Message::now(format!("read again; gone, and their edits are kept for them: {}", gone.join(", ")), true)
         });
     }
 
@@ -266,8 +283,10 @@ impl Editor {
             Action::Solo(node) => self.document.set_solo(node),
             Action::Undo => self.document.undo(),
             Action::Redo => self.document.redo(),
-            Action::Save => self.save(),
-            Action::Camera(_) => {}
+            Action::Save if self.document.is_unsaved() => {
+                self.save();
+            }
+            Action::Save | Action::Camera(_) => {}
         }
     }
 
@@ -302,18 +321,40 @@ impl Editor {
         }
     }
 
-    fn save(&mut self) {
-        self.save_as(&self.sidecar.clone());
+    /// Saves the edits beside the scene; whether that went well.
+    pub fn save(&mut self) -> bool {
+        self.save_as(&self.sidecar.clone())
     }
 
     /// Saves the edits to a file; only the one beside the scene is read again with it.
-    pub fn save_as(&mut self, path: &Path) {
-        let is_sidecar = path == self.sidecar;
-        let saved = if is_sidecar { self.document.save_edits(path) } else { self.document.copy_edits(path) };
+    pub fn save_as(&mut self, path: &Path) -> bool {
+        let saved = self.write(path);
+        let is_saved = saved.is_ok();
         self.message = Some(match saved {
-            Ok(()) => Message::now(format!("saved {}", path.display()), false),
-            Err(error) => Message::now(error.to_string(), true),
+            Ok(None) => Message::now(format!("saved {}", path.display()), false),
+            Ok(Some(aside)) => {
+                let aside = aside.display();
+                Message::now(format!("saved {}; the file that could not be read is now {aside}", path.display()), true)
+            }
+            Err(error) => Message::now(format!("{error:#}"), true),
         });
+        is_saved
+    }
+
+    /// Writes a file of edits; where one that could not be read is now.
+    fn write(&mut self, path: &Path) -> anyhow::Result<Option<PathBuf>> {
+        // A dialog names files from the root.
+        let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        if absolute(path) != absolute(&self.sidecar) {
+            self.document.copy_edits(path)?;
+            return Ok(None);
+        }
+        let aside = (self.is_unreadable && path.exists())
+            .then(|| config::put_aside(path).with_context(|| format!("{}: cannot be put aside", path.display())))
+            .transpose()?;
+        self.is_unreadable = false;
+        self.document.save_edits(path)?;
+        Ok(aside)
     }
 
     /// Hides what is selected.
@@ -360,19 +401,89 @@ impl Editor {
     }
 }
 
+/// What to say of a file of edits that was read.
+fn message_of(path: &Path, absent: Result<Vec<String>, String>) -> Message {
+    match absent {
+        Ok(absent) if absent.is_empty() => Message::now(format!("with the edits of {}", path.display()), false),
+        Ok(absent) => {
+            let parts = absent.join(", ");
+            Message::now(format!("edits of parts that the scene lacks are kept for them: {parts}"), true)
+        }
+        Err(reason) => Message::now(reason, true),
+    }
+}
+
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
-    use clap::Parser;
-
     use super::*;
-    use crate::cli::Cli;
-    use crate::session;
+
+    /// The built-in scene as a file of a new folder.
+    fn room(name: &str) -> (PathBuf, Source, Loaded) {
+        let folder = std::env::temp_dir().join(format!("fovea-editor-{name}-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&folder);
+        std::fs::create_dir_all(&folder).unwrap();
+        let args = crate::cli::parse(["fovea".into()]).unwrap().preview;
+        let source = Source::File(folder.join("room.glb"));
+        (folder, source, crate::session::load(&Source::BuiltIn, &args.scene).unwrap())
+    }
+
+    #[test]
+    fn a_file_of_edits_that_cannot_be_read_is_put_aside_before_another_is_written() {
+        let (folder, source, loaded) = room("unreadable");
+        let sidecar = folder.join("room.glb.fovea.json");
+        let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
+        for (text, aside) in [("{ \"format\"", "room.glb.fovea.broken.json"), ("[]", "room.glb.fovea.broken-2.json")] {
+            std::fs::write(&sidecar, text).unwrap();
+            let mut editor = Editor::open(&source, &loaded);
+            editor.act(Action::Save);
+            assert_eq!(read("room.glb.fovea.json"), text, "there is nothing to save");
+            for (node, message) in [(0, aside), (1, "saved")] {
+                let hide = Edit::Hide(editor.document.tree().roots[node], true);
+                editor.act(Action::Edit(hide, Gesture::Once));
+                editor.act(Action::Save);
+                assert!(editor.message().unwrap().text.contains(message), "{:?}", editor.message());
+                assert_eq!(read(aside), text, "the edits of another file stay where they are");
+            }
+            assert_eq!(Editor::open(&source, &loaded).document.edits(), editor.document.edits());
+        }
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn edits_of_another_file_are_opened_in_one_step() {
+        let (folder, source, loaded) = room("opened");
+        let mut editor = Editor::open(&source, &loaded);
+        let roots = editor.document.tree().roots.clone();
+        let hide = |editor: &mut Editor, place: usize| {
+            editor.act(Action::Edit(Edit::Hide(roots[place], true), Gesture::Once));
+        };
+        (0..2).for_each(|place| hide(&mut editor, place));
+        let copy = folder.join("other.fovea.json");
+        assert!(editor.save_as(&copy) && editor.document.is_unsaved(), "a copy is not read again");
+        let copied = editor.document.edits().clone();
+        let mut editor = Editor::open(&source, &loaded);
+        hide(&mut editor, 2);
+        let before = editor.document.edits().clone();
+        editor.open_edits(&copy);
+        assert_eq!((editor.document.edits(), editor.document.is_unsaved()), (&copied, true));
+        editor.act(Action::Undo);
+        assert_eq!(editor.document.edits(), &before);
+        editor.act(Action::Redo);
+        assert_eq!(editor.document.edits(), &copied);
+        std::fs::write(&copy, "{").unwrap();
+        editor.open_edits(&copy);
+        assert!(editor.message().unwrap().wrong);
+        assert_eq!(editor.document.edits(), &copied, "what is no file of edits changes nothing");
+        std::fs::remove_dir_all(folder).unwrap();
+    }
 
     #[test]
     fn an_environment_that_failed_is_tried_again_when_it_is_named_again() {
-        let loaded = session::load(&Source::BuiltIn, &Cli::parse_from(["fovea"]).preview.scene).unwrap();
-        let mut editor = Editor::new(&loaded, "unused".into());
+        let loaded =
+            crate::session::load(&Source::BuiltIn, &crate::cli::parse(["fovea".into()]).unwrap().preview.scene)
+                .unwrap();
+        let mut editor = Editor::open(&Source::BuiltIn, &loaded);
         let path = std::path::absolute("sky.hdr").unwrap();
         let fails = |editor: &mut Editor| editor.take_environment(path.clone(), Err("no such file".into()));
         assert_eq!(editor.ask_for_environment(), None);

@@ -11,6 +11,8 @@ use crate::recent::RecentFiles;
 /// Letters of a name in the menu at most.
 const LONGEST_NAME: usize = 48;
 
+const SAVE_EDITS_HINT: &str = "Beside the scene and with the name that is proposed they are there again with it; others are opened with Open edits…";
+
 /// What the menu asks for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Action {
@@ -31,6 +33,7 @@ pub fn show(ui: &mut Ui, recent: Option<&RecentFiles>) -> Option<Action> {
         for (name, hint, purpose) in [
             ("Open environment…", "An equirectangular image, .hdr or .exr", Purpose::Environment),
             ("Go on with a film…", "An EXR that fovea wrote of this scene", Purpose::Film),
+            ("Open edits…", "A file of edits in place of the present ones; Ctrl Z takes that back", Purpose::Edits),
         ] {
             if ui.button(name).on_hover_text(hint).clicked() {
                 action = Some(Action::Choose(purpose));
@@ -43,7 +46,7 @@ pub fn show(ui: &mut Ui, recent: Option<&RecentFiles>) -> Option<Action> {
         for (name, hint, purpose) in [
             ("Save picture as…", "PNG, as it is shown", Purpose::SavePicture),
             ("Save film as…", "EXR: linear, with all samples; a render can go on from it", Purpose::SaveFilm),
-            ("Save edits as…", "A small file beside the scene is read again with it", Purpose::SaveEdits),
+            ("Save edits as…", SAVE_EDITS_HINT, Purpose::SaveEdits),
         ] {
             if ui.button(name).on_hover_text(hint).clicked() {
                 action = Some(Action::Choose(purpose));

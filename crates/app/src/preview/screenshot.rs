@@ -103,6 +103,11 @@ impl Screenshot {
         }
     }
 
+    /// Whether the window is closed on its account.
+    pub fn is_done(&self) -> bool {
+        self.outcome.lock().unwrap_or_else(PoisonError::into_inner).is_some()
+    }
+
     fn leave(&self, ctx: &Context, outcome: anyhow::Result<Value>) {
         *self.outcome.lock().unwrap_or_else(PoisonError::into_inner) = Some(outcome);
         ctx.send_viewport_cmd(ViewportCommand::Close);

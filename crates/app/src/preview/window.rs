@@ -26,6 +26,7 @@ use super::overlay::{self, Action, Facts, Visibility};
 use super::screenshot::Screenshot;
 use super::seeing;
 use super::split_panel::{self, SplitTimes};
+use super::unsaved::{Decision, Next, Unsaved};
 use super::versions::Versions;
 use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
@@ -64,6 +65,9 @@ pub struct Window {
     gaze_direction: Option<Vec3>,
     /// What is done with it.
     editor: Option<Editor>,
+    unsaved: Unsaved,
+    /// The present scene is opened again: what is heard until then is of another.
+    going_back: bool,
     /// The version that the engine has been given.
     given: Option<Arc<Scene>>,
     camera: usize,
@@ -104,6 +108,8 @@ impl Window {
             split: SplitTimes::default(),
             gaze_direction: None,
             editor: None,
+            unsaved: Unsaved::default(),
+            going_back: false,
             given: None,
             camera: 0,
             screenshot,
@@ -135,22 +141,33 @@ impl Window {
         }
         (self.engine, self.adapter, self.mode_presses) = (engine, adapter, 0);
         self.versions = Versions::default();
+        self.unsaved.renew();
         self.note =
             Some(Message::now("the graphics device was lost; the film goes on from its last snapshot".into(), false));
     }
 
     /// Takes what the loader has: a new scene starts from its camera, a new version of the same one keeps the view.
-    fn follow_loader(&mut self, ctx: &Context, rect: Rect) {
-        while let Some(event) = self.loader.poll() {
+    fn follow_loader(&mut self, rect: Rect) {
+        while !self.unsaved.is_asking()
+            && let Some(event) = self.loader.poll()
+        {
             match event {
                 LoadEvent::Opened(source, loaded) => {
-                    let title = format!("{} - Fovea", source.name());
-                    ctx.send_viewport_cmd(egui::ViewportCommand::Title(title));
-                    self.open(&source, &loaded, rect);
-                    self.add_recent(&source);
+                    let is_present = self.editor.as_ref().is_some_and(|editor| *editor.source() == source);
+                    if std::mem::take(&mut self.going_back) && is_present {
+                        self.follow_file(&loaded);
+                    } else {
+                        let next = Next::Show(Box::new((source, loaded)));
+                        let allowed = self.unsaved.allow(next, self.editor.as_ref());
+                        allowed.into_iter().for_each(|next| self.go_on(next, rect));
+                    }
                 }
+                LoadEvent::Changed(_) | LoadEvent::Broken(_) if self.going_back => {}
                 LoadEvent::Changed(loaded) => self.follow_file(&loaded),
-                LoadEvent::NotOpened(text) => self.note = Some(Message::now(text, true)),
+                LoadEvent::NotOpened(text) => {
+                    self.unsaved.keep();
+                    self.note = Some(Message::now(text, true));
+                }
                 LoadEvent::Broken(text) => self.broken = Some(text),
                 LoadEvent::Environment(path, result) => {
                     if let Some(editor) = &mut self.editor {
@@ -161,7 +178,43 @@ impl Window {
         }
     }
 
+    /// Opens a scene, after a question where that would lose edits.
+    fn open_scene(&mut self, source: Source) {
+        if let Some(Next::Open(source)) = self.unsaved.allow(Next::Open(source), self.editor.as_ref()) {
+            self.loader.open(source);
+        }
+    }
+
+    /// Asks whether edits may be lost, and does what is decided.
+    fn ask(&mut self, ctx: &Context, rect: Rect) {
+        match self.unsaved.ask(ctx, self.editor.as_mut()) {
+            Some(Decision::GoOn(next)) => self.go_on(next, rect),
+            // The loader follows the files of the other scene by now.
+            Some(Decision::Stay(Next::Show(_))) => {
+                if let Some(editor) = &self.editor {
+                    self.going_back = true;
+                    self.loader.open(editor.source().clone());
+                }
+            }
+            Some(Decision::Stay(Next::Close | Next::Open(_))) | None => {}
+        }
+    }
+
+    fn go_on(&mut self, next: Next, rect: Rect) {
+        match next {
+            // It closes by itself.
+            Next::Close => {}
+            Next::Open(source) => self.loader.open(source),
+            Next::Show(opened) => {
+                let (source, loaded) = *opened;
+                self.open(&source, &loaded, rect);
+                self.add_recent(&source);
+            }
+        }
+    }
+
     fn open(&mut self, source: &Source, loaded: &Loaded, rect: Rect) {
+        self.unsaved.keep();
         let open = OpenScene::new(loaded);
         let aspect = rect.width() / rect.height().max(1.0);
         // What there was to say before there was anything to see is said now.
@@ -284,7 +337,7 @@ impl Window {
         }
     }
 
-    fn message(&self, ctx: &Context, state: &State) {
+    fn message(&mut self, ctx: &Context, state: &State) {
         if let Some(text) = &self.broken {
             overlay::broken(ctx, text);
         }
@@ -293,6 +346,7 @@ impl Window {
             if elapsed >= WORTH_SAYING || self.scene.is_none() {
                 if overlay::loading(ctx, &loading.name, elapsed, self.scene.is_some()) {
                     self.loader.cancel();
+                    self.unsaved.keep();
                 }
                 ctx.request_repaint_after(WORTH_SAYING);
                 return;
@@ -377,8 +431,13 @@ impl eframe::App for Window {
         }
         let rect = ui.max_rect();
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
-        self.follow_loader(&ctx, rect);
-        self.split_keys(&ctx, &state);
+        if !self.screenshot.as_ref().is_some_and(Screenshot::is_done) {
+            self.unsaved.follow_close(&ctx, self.editor.as_ref());
+        }
+        self.follow_loader(rect);
+        if !self.unsaved.is_asking() {
+            self.split_keys(&ctx, &state);
+        }
         self.keys(&ctx, state.headset.is_some());
         self.follow_presses(&state);
         if state.headset.is_some() {
@@ -446,6 +505,8 @@ impl eframe::App for Window {
         if !self.gaze.shows_dots() {
             self.overlay(&ctx, &state, deg_per_px);
         }
+        self.ask(&ctx, rect);
+        self.unsaved.follow_title(&ctx, self.editor.as_ref());
         self.hand_over();
         self.gaze.remember_screen(&self.controls, now);
         self.follow_files(&ctx, frame);

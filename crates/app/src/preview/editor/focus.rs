@@ -82,7 +82,7 @@ mod tests {
         let rect = Rect::from_min_size(Pos2::ZERO, egui::vec2(1280.0, 720.0));
         let pointer = egui::pos2(340.0, 560.0);
         // Not `Editor::open`, which looks for saved edits in the working folder.
-        let mut editor = Editor::new(&loaded, "unused".into());
+        let mut editor = Editor::new(&Source::BuiltIn, &loaded);
         let under = editor.pivot(pointer, rect, &standpoint);
         let at = standpoint.view.point_of(under - standpoint.position).unwrap();
         assert!(at.distance(point_in_view(rect, pointer)) < 1e-3, "{at}");

@@ -10,12 +10,14 @@ use tracer::scene::Scene;
 
 use super::Window;
 use crate::cli::PreviewArgs;
+use crate::document::sidecar;
 use crate::output::exr::{self, FilmFile};
 use crate::output::{OutputError, free_name};
 use crate::preferences::{Preferences, Store, WindowPlace};
 use crate::preview::background::Background;
 use crate::preview::controls::Controls;
 use crate::preview::dialogs::{Answer, Dialogs, Purpose};
+use crate::preview::editor::Editor;
 use crate::preview::engine::{Destination, Message, Request};
 use crate::preview::overlay::Visibility;
 use crate::preview::{file_menu, place};
@@ -107,18 +109,25 @@ impl Window {
     pub(super) fn act_on_file(&mut self, action: file_menu::Action) {
         match action {
             file_menu::Action::Choose(purpose) => self.files.asked = Some(purpose),
-            file_menu::Action::Open(path) => self.loader.open(Source::File(path)),
+            file_menu::Action::Open(path) => self.open_scene(Source::File(path)),
         }
     }
 
     /// Takes dropped files, answers of dialogs, films that were read, and what has changed of the settings.
     pub(super) fn follow_files(&mut self, ctx: &Context, frame: &eframe::Frame) {
+        if !self.unsaved.is_asking() {
+            self.take_files(ctx, frame);
+        }
+        self.remember(ctx, frame);
+    }
+
+    fn take_files(&mut self, ctx: &Context, frame: &eframe::Frame) {
         self.open_dropped_file(ctx);
         if let Some(purpose) = self.files.asked.take() {
             let scene = self.scene.as_ref().map_or("picture", |(scene, _)| scene.name.as_str());
-            let folder = self.files.folder.as_deref();
-            let name = suggested_name(purpose, folder.unwrap_or(Path::new("")), scene);
-            if let Err(error) = self.files.dialogs.ask(ctx, frame, purpose, folder, &name) {
+            let sidecar = self.editor.as_ref().map(Editor::sidecar);
+            let (folder, name) = suggestion(purpose, self.files.folder.as_deref(), scene, sidecar);
+            if let Err(error) = self.files.dialogs.ask(ctx, frame, purpose, folder.as_deref(), &name) {
                 self.note = Some(Message::now(error.to_string(), true));
             }
         }
@@ -133,27 +142,20 @@ impl Window {
         if let Some(read) = self.files.films.poll() {
             self.take_film(read);
         }
-        self.remember(ctx, frame);
     }
 
     fn open_dropped_file(&mut self, ctx: &Context) {
         let dropped = ctx.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_owned()));
-        let Some(path) = dropped else { return };
-        let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
-        let purpose = match extension.as_deref() {
-            Some("hdr") => Purpose::Environment,
-            // A film of fovea, or an environment.
-            Some("exr") => Purpose::Film,
-            _ => Purpose::Scene,
-        };
-        self.take_file(ctx, purpose, path);
+        if let Some(path) = dropped {
+            self.take_file(ctx, purpose_of(&path), path);
+        }
     }
 
     /// Does with a file what it was chosen for.
     fn take_file(&mut self, ctx: &Context, purpose: Purpose, path: PathBuf) {
         self.files.folder = path.parent().filter(|folder| folder.is_absolute()).map(Path::to_owned);
         match purpose {
-            Purpose::Scene => self.loader.open(Source::File(path)),
+            Purpose::Scene => self.open_scene(Source::File(path)),
             Purpose::Environment => {
                 if let Some(editor) = &mut self.editor {
                     editor.set_environment(path);
@@ -166,6 +168,10 @@ impl Window {
                     self.note = Some(Message::now(error.to_string(), true));
                 }
             }
+            Purpose::Edits => match &mut self.editor {
+                Some(editor) => editor.open_edits(&path),
+                None => self.note = Some(Message::now("edits are opened after their scene".into(), true)),
+            },
             Purpose::SavePicture => self.engine.request(Request::SavePng(Destination::File(path))),
             Purpose::SaveFilm => self.engine.request(Request::SaveExr(Destination::File(path))),
             Purpose::SaveEdits => {
@@ -251,15 +257,35 @@ impl Window {
     }
 }
 
-/// A name for a file that is to be written.
-fn suggested_name(purpose: Purpose, folder: &Path, scene: &str) -> String {
+/// The folder that a dialog opens in, and a name for a file that is to be written.
+fn suggestion(purpose: Purpose, last: Option<&Path>, scene: &str, sidecar: Option<&Path>) -> (Option<PathBuf>, String) {
+    let folder = last.unwrap_or(Path::new(""));
     let path = match purpose {
         Purpose::SavePicture => free_name(folder, scene, "png"),
         Purpose::SaveFilm => free_name(folder, scene, "exr"),
-        Purpose::SaveEdits => free_name(folder, scene, "fovea.json"),
-        Purpose::Scene | Purpose::Environment | Purpose::Film => return String::new(),
+        // Where they are read again with the scene.
+        Purpose::SaveEdits => sidecar.and_then(|path| std::path::absolute(path).ok()).unwrap_or_default(),
+        Purpose::Scene | Purpose::Environment | Purpose::Film | Purpose::Edits => PathBuf::new(),
     };
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let beside = path.parent().filter(|folder| folder.is_absolute()).map(Path::to_owned);
+    (beside.or(last.map(Path::to_owned)), name)
+}
+
+/// What a dropped file is for, by its name.
+fn purpose_of(path: &Path) -> Purpose {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+    let is = |ending: &str| name.ends_with(ending);
+    if is(sidecar::ENDING) {
+        Purpose::Edits
+    } else if is(".hdr") {
+        Purpose::Environment
+    } else if is(".exr") {
+        // A film of fovea, or an environment.
+        Purpose::Film
+    } else {
+        Purpose::Scene
+    }
 }
 
 fn read_film(path: PathBuf) -> FilmRead {
@@ -320,6 +346,26 @@ mod tests {
         // A default that is asked for is asked for.
         let asked = preferred("--mode fv --exposure 0 --tonemap agx --denoise on");
         assert_eq!(asked, (Mode::Fv, true, (0.0, ToneMapping::Agx), true, false));
+    }
+
+    #[test]
+    fn edits_are_proposed_to_be_saved_where_they_are_read_again() {
+        let folder = std::path::absolute("scenes").unwrap();
+        let last = std::path::absolute("elsewhere").unwrap();
+        let beside = folder.join("room.glb.fovea.json");
+        let proposed = |purpose: Purpose| suggestion(purpose, Some(&last), "room.glb", Some(&beside));
+        assert_eq!(proposed(Purpose::SaveEdits), (Some(folder), "room.glb.fovea.json".into()));
+        assert_eq!(proposed(Purpose::SavePicture), (Some(last.clone()), "room-1.png".into()));
+        assert_eq!(proposed(Purpose::Edits), (Some(last.clone()), String::new()));
+        for (name, purpose) in [
+            ("room.glb.FOVEA.json", Purpose::Edits),
+            ("room.gltf", Purpose::Scene),
+            ("sky.HDR", Purpose::Environment),
+            ("room-1.exr", Purpose::Film),
+            ("hdr", Purpose::Scene),
+        ] {
+            assert_eq!(purpose_of(&last.join(name)), purpose, "{name}");
+        }
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::preview::{file_menu, seeing};
 
 impl Window {
     pub(super) fn keys(&mut self, ctx: &Context, in_headset: bool) {
-        if ctx.egui_wants_keyboard_input() {
+        if ctx.egui_wants_keyboard_input() || self.unsaved.is_asking() {
             return;
         }
         // Nothing else may change what somebody is timed on.
