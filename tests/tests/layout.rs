@@ -8,19 +8,23 @@ use std::{
     sync::Arc,
 };
 
-use fovea_tests::{device, scenes};
+use fovea_tests::{device, plant::exchanged, scenes};
 use glam::Vec3;
 use naga::{
     AddressSpace, TypeInner,
     valid::{Capabilities, ValidationFlags, Validator},
 };
 use tracer::{
+    distribution::Distribution,
     features::{Feature, SceneFeatures},
+    film::FilmOptions,
     gpu::GeometryPlace,
     kernels::{
         Kernel, KernelConstants, KernelKey, ShaderSources, compose,
         layout::{StructLayout, codes, shared_layouts},
+        pipelines::KernelError,
     },
+    renderer::RenderError,
     view::DebugView,
 };
 
@@ -34,6 +38,25 @@ fn sources() -> Arc<ShaderSources> {
 fn key(kernel: Kernel, features: SceneFeatures, sources: &Arc<ShaderSources>) -> KernelKey {
     let constants = KernelConstants { stack_size: 16, environment_cells: [64, 32] };
     KernelKey { kernel, features, constants, sources: sources.clone() }
+}
+
+/// Two tables at one binding pass the parser, and no driver.
+#[test]
+fn what_a_driver_refuses_leaves_the_last_kernels() {
+    let film = FilmOptions::equirect(16, 8);
+    let everywhere = Distribution::omnidirectional(device::inverse());
+    let mut room = scenes::Builder::new(Vec3::ONE);
+    let grey = room.material(scenes::lambert(Vec3::splat(0.5)));
+    room.quad(Vec3::new(-1.0, -1.0, -3.0), 2.0 * Vec3::X, 2.0 * Vec3::Y, grey);
+    let mut renderer = device::independent(&device::gpu(), film, 1, 1, everywhere, &room.build());
+    let faulty = exchanged(
+        renderer.shaders(),
+        "path_bindings",
+        &[("@group(1) @binding(5) var<storage, read> materials", "@group(1) @binding(4) var<storage, read> materials")],
+    );
+    let error = renderer.set_shaders(faulty).unwrap_err();
+    assert!(matches!(error, RenderError::Kernel(KernelError::Driver { .. })), "{error}");
+    assert_eq!(device::trace(&mut renderer, 1 << 10).unwrap().header.samples(), 1 << 10);
 }
 
 /// What a module's header calls its twin is there.
@@ -263,8 +286,8 @@ fn constants_are_those_of_the_host() {
 fn a_diffuse_scene_has_a_kernel_without_lights_textures_and_lobes_that_it_lacks() {
     // Elsewhere the geometry may be in textures.
     let gpu = device::gpu().with_geometry_in(GeometryPlace::Buffers);
-    let film = tracer::film::FilmOptions::equirect(16, 8);
-    let distribution = tracer::distribution::Distribution::omnidirectional(device::inverse());
+    let film = FilmOptions::equirect(16, 8);
+    let distribution = Distribution::omnidirectional(device::inverse());
     let renderer = device::independent(&gpu, film, 1, 4, distribution, &scenes::empty(Vec3::ONE));
     let plain = compose(&renderer.key(Kernel::Trace)).unwrap();
     let full = compose(&key(Kernel::Trace, SceneFeatures::all(), &sources())).unwrap();

@@ -299,6 +299,31 @@ impl Gpu {
     }
 }
 
+/// What the device complains of on this thread while this lives, for a caller who answers for it.
+#[derive(Debug)]
+pub(crate) struct Complaints {
+    // Scopes end in the reverse of the order in which they began, also where a caller returns early.
+    memory: wgpu::ErrorScopeGuard,
+    internal: wgpu::ErrorScopeGuard,
+    validation: wgpu::ErrorScopeGuard,
+}
+
+impl Complaints {
+    pub fn of(device: &wgpu::Device) -> Self {
+        let validation = device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let internal = device.push_error_scope(wgpu::ErrorFilter::Internal);
+        let memory = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        Self { memory, internal, validation }
+    }
+
+    /// The cause of what there was: use of what memory lacked is refused after that, which is a consequence.
+    pub fn end(self) -> Option<wgpu::Error> {
+        let Self { memory, internal, validation } = self;
+        let errors = [memory.pop(), internal.pop(), validation.pop()].map(pollster::block_on);
+        errors.into_iter().flatten().next()
+    }
+}
+
 /// What is known of free memory, as the end of an error's sentence.
 pub(crate) fn free_text(free: &Option<u64>) -> String {
     free.map_or_else(String::new, |bytes| format!("; {bytes} bytes are free"))

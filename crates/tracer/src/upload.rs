@@ -8,7 +8,7 @@ use wgpu::util::DeviceExt;
 
 use crate::{
     features::{Feature, SceneFeatures},
-    gpu::{Gpu, free_text},
+    gpu::{Complaints, Gpu, free_text},
     kernels::KernelConstants,
     scene::{Environment, Scene},
 };
@@ -64,6 +64,12 @@ pub enum UploadError {
         adapter: String,
         /// Bytes of memory that are free, where that is known.
         free: Option<u64>,
+    },
+    /// The device refused it for another reason.
+    #[error("the device refused the scene: {cause}")]
+    Refused {
+        /// As wgpu has it.
+        cause: String,
     },
 }
 
@@ -184,6 +190,20 @@ impl Uploader<'_> {
         if self.gpu.lacks_memory(bytes) { Err(self.out_of_memory(what, bytes)) } else { Ok(()) }
     }
 
+    /// Finds out whether the device took all that was handed over; nothing of it stays in `cache` if not.
+    fn settle(&self, complaints: Complaints, cache: &mut SceneCache) -> Result<(), UploadError> {
+        let Some(error) = complaints.end() else { return Ok(()) };
+        // Then all is refused, and noticed by whoever waits for the device.
+        if self.gpu.is_lost() {
+            return Ok(());
+        }
+        *cache = SceneCache::new(cache.hierarchy());
+        Err(match error {
+            wgpu::Error::OutOfMemory { .. } => self.out_of_memory("buffers and textures", self.device_bytes),
+            error => UploadError::Refused { cause: error.to_string() },
+        })
+    }
+
     fn out_of_memory(&self, what: &'static str, bytes: u64) -> UploadError {
         let adapter = self.gpu.info().name.clone();
         UploadError::OutOfMemory { what, bytes, adapter, free: self.gpu.free_memory() }
@@ -229,7 +249,7 @@ impl SceneOnGpu {
     /// When a part exceeds the adapter's limits or its memory.
     pub fn upload(gpu: &Gpu, scene: &Scene, cache: &mut SceneCache) -> Result<Self, UploadError> {
         let started = Instant::now();
-        let scope = gpu.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let complaints = Complaints::of(&gpu.device);
         let mut uploader = Uploader { gpu, device_bytes: 0, uploaded_bytes: 0 };
         let mut placed = Placed::upload(scene, cache, &mut uploader)?;
         let shapes_secs = started.elapsed().as_secs_f64();
@@ -262,9 +282,7 @@ impl SceneOnGpu {
             cache.table("texture slots", &slots, &mut uploader)?,
             cache.table("lights", &light_table.lights, &mut uploader)?,
         ];
-        if pollster::block_on(scope.pop()).is_some() {
-            return Err(uploader.out_of_memory("buffers and textures", uploader.device_bytes));
-        }
+        uploader.settle(complaints, cache)?;
 
         let light_count = light_table.lights.len() as u32;
         let backdrop = scene.backdrop.color();

@@ -5,6 +5,7 @@ use std::{collections::HashMap, sync::Arc};
 use thiserror::Error;
 
 use super::{ComposeError, KernelKey, compose};
+use crate::gpu::Complaints;
 
 /// Why a kernel has no pipeline.
 #[derive(Debug, Error)]
@@ -63,6 +64,7 @@ impl Pipeline {
         } else {
             wgpu::ShaderStages::COMPUTE
         };
+        let complaints = Complaints::of(device);
         let groups = reflect(device, &module, stages, &label);
         let layouts: Vec<_> = groups.iter().map(|(layout, _)| Some(layout)).collect();
         let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -70,7 +72,6 @@ impl Pipeline {
             bind_group_layouts: &layouts,
             immediate_size: 0,
         });
-        let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
         let descriptor =
             wgpu::ShaderModuleDescriptor { label: Some(&label), source: wgpu::ShaderSource::Wgsl(text.into()) };
         // Clamping every index and counting every loop takes a fifth of the traversal's time on lavapipe (docs/ARCHITECTURE.md).
@@ -115,7 +116,7 @@ impl Pipeline {
                 cache: None,
             })),
         };
-        if let Some(error) = pollster::block_on(scope.pop()) {
+        if let Some(error) = complaints.end() {
             return Err(KernelError::Driver { kernel: label, cause: error.to_string() });
         }
         Ok(Self { kind, groups, label })

@@ -1,5 +1,5 @@
 //! How light samples are shared between the environment and the lights: by what of each reaches the surfaces that are seen.
-//! The share is a property of the scene alone, so that films do not depend on where the viewer went first.
+//! The share is a property of the scene and of the film that it was set for, so that films do not depend on where the viewer went first.
 
 use glam::{Mat3, Quat, Vec3};
 

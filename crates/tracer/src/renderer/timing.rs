@@ -155,6 +155,7 @@ impl Renderer {
     /// # Errors
     /// When there is no scene or the device is lost.
     pub fn trace_timed(&mut self, samples: u32) -> Result<(u32, Option<BatchSeconds>), RenderError> {
+        self.follow_noise()?;
         let samples = self.next_batch(samples);
         self.write_params(samples)?;
         let bound = self.bound.as_ref().ok_or(RenderError::NoScene)?;
@@ -173,6 +174,7 @@ impl Renderer {
         })?;
         self.samples += u64::from(samples);
         self.next_sample += u64::from(samples);
+        self.count_steered(samples);
         let Some(accumulated) = accumulated else { return Ok((samples, None)) };
         let traced: Vec<PassSeconds> = submissions.into_iter().flatten().collect();
         let of = |kernel| traced.iter().fold(0.0, |sum, passes| sum + passes.of(kernel));

@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::{Placed, SceneCache, UploadError, Uploader};
 use crate::{
     features::SceneFeatures,
-    gpu::Gpu,
+    gpu::{Complaints, Gpu},
     kernels::KernelConstants,
     scene::{Material, Scene, TexelEncoding, Texture},
 };
@@ -30,6 +30,7 @@ pub(crate) struct SketchOnGpu {
 impl SketchOnGpu {
     /// Builds and uploads what is not in `cache`; an upload of the same scene finds it there.
     pub fn upload(gpu: &Gpu, scene: &Scene, cache: &mut SceneCache) -> Result<Self, UploadError> {
+        let complaints = Complaints::of(&gpu.device);
         let mut uploader = Uploader { gpu, device_bytes: 0, uploaded_bytes: 0 };
         let placed = Placed::upload(scene, cache, &mut uploader)?;
         let colors: Vec<Vec3> = scene.materials.iter().map(|material| mean_color(scene, material)).collect();
@@ -39,13 +40,11 @@ impl SketchOnGpu {
             color.copied().unwrap_or(PLAIN).extend(1.0).to_array()
         };
         let part_colors: Vec<[f32; 4]> = placed.placement.sources.iter().map(color_of).collect();
-        Ok(Self {
-            features: placed.features(cache.hierarchy()),
-            constants: placed.constants([0; 2]),
-            part_colors: uploader.storage("part colours", &part_colors)?,
-            instances: uploader.storage("instances", &placed.placement.instances)?,
-            placed,
-        })
+        let part_colors = uploader.storage("part colours", &part_colors)?;
+        let instances = uploader.storage("instances", &placed.placement.instances)?;
+        uploader.settle(complaints, cache)?;
+        let (features, constants) = (placed.features(cache.hierarchy()), placed.constants([0; 2]));
+        Ok(Self { features, constants, part_colors, instances, placed })
     }
 
     /// Of group 1 of the path kernels, what is there.
