@@ -10,6 +10,7 @@ use tracer::{
     film::{FilmOptions, SampleRange},
     kernels::layout::FirstHit,
     renderer::{FilmPose, Renderer},
+    scene::Scene,
     view::{DebugView, ToneMap, ViewProjection, ViewSettings},
 };
 
@@ -39,9 +40,12 @@ fn room() -> Renderer {
     scene.quad(Vec3::new(-20.0, -1.0, -3.0), 20.0 * Vec3::X, 20.0 * Vec3::Y, light);
     scene.quad(Vec3::new(0.0, -1.0, -3.0), 20.0 * Vec3::X, 20.0 * Vec3::Y, dark);
     scene.quad(Vec3::new(-20.0, -1.0, 3.0), 40.0 * Vec3::X, -6.0 * Vec3::Z, floor);
-    let film = FilmOptions::perspective(SIZE[0], SIZE[1], YFOV);
+    with_first_hits(&scene.build(), FilmOptions::perspective(SIZE[0], SIZE[1], YFOV))
+}
+
+fn with_first_hits(scene: &Scene, film: FilmOptions) -> Renderer {
     let distribution = Distribution::omnidirectional(device::inverse());
-    let mut renderer = device::independent(&device::gpu(), film, 1, 1, distribution, &scene.build());
+    let mut renderer = device::independent(&device::gpu(), film, 1, 1, distribution, scene);
     renderer.set_pose(FilmPose::default());
     while !renderer.trace_first_hits(&settings(true), u32::MAX).unwrap() {}
     renderer
@@ -208,6 +212,24 @@ fn rare_light_leaves_few_dark_places() {
         100.0 * planted
     );
     assert!(dark < 0.15 && planted > 0.2, "{dark}, {planted}");
+}
+
+/// Where many pixels of the view show one of the film, its samples are not as many for each of them.
+#[test]
+fn samples_of_a_film_that_is_coarser_than_the_view_count_once() {
+    let _time = device::Stopwatch::start("coarse film");
+    let mut scene = scenes::Builder::new(Vec3::ONE);
+    let grey = scene.material(scenes::lambert(Vec3::splat(0.5)));
+    scene.quad(Vec3::new(-20.0, -20.0, -3.0), 40.0 * Vec3::X, 40.0 * Vec3::Y, grey);
+    let mut renderer = with_first_hits(&scene.build(), FilmOptions::perspective(SIZE[0] / 4, SIZE[1] / 4, YFOV));
+    let even = |pixels: u32| vec![Vec3::splat(0.5); pixels as usize];
+    expose(&mut renderer, &even(SIZE[0] * SIZE[1] / 16), 0.2, |_| 8);
+    let noise = |renderer: &mut Renderer| error(&shown(renderer, &settings(true)), &even(SIZE[0] * SIZE[1]));
+    let once = noise(&mut renderer);
+    plant(&mut renderer, "view::gather", ("weight *= footprint.share;", ""));
+    let often = noise(&mut renderer);
+    eprintln!("noise of an even wall: {once:.3}; with its samples counted by each pixel {often:.3}");
+    assert!(once < 0.7 * often, "{once}, {often}");
 }
 
 #[test]
