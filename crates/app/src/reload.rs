@@ -15,7 +15,7 @@ use notify::{RecursiveMode, Watcher};
 use tracer::scene::EnvironmentImage;
 
 use crate::cli::SceneArgs;
-use crate::session::{self, Loaded, Source, one_line};
+use crate::session::{self, Loaded, Shapes, Source, one_line};
 use rule::{Reading, Rule, Step, Timing};
 use stamps::{Stamps, folders};
 
@@ -24,10 +24,14 @@ pub mod stamps;
 
 /// How long a thread without a scene sleeps.
 const IDLE: Duration = Duration::from_secs(3600);
+/// How long the reading of images waits at most for a sketch, which needs the same cores: they would have it wait for all of them.
+const SKETCH: Duration = Duration::from_secs(1);
 
 /// What came of opening or reading again.
 #[derive(Clone, Debug)]
 pub enum LoadEvent {
+    /// What there is to sketch of a scene that was asked for and is still being read.
+    Shapes(Source, Sketchable),
     /// A scene that was asked for.
     Opened(Source, Loaded),
     /// A newer version of the scene that is open.
@@ -38,6 +42,15 @@ pub enum LoadEvent {
     Broken(String),
     /// An environment image that was asked for, or why it cannot be had.
     Environment(PathBuf, Result<Arc<EnvironmentImage>, String>),
+}
+
+/// Shapes of a scene whose images are not read yet.
+#[derive(Clone, Debug)]
+pub struct Sketchable {
+    /// The scene as far as it is known.
+    pub shapes: Shapes,
+    /// The reading goes on when the last of these is gone, if not before.
+    _reading: Sender<()>,
 }
 
 /// What takes time at the moment.
@@ -57,6 +70,8 @@ enum Note {
     Cancel,
     /// Something happened in a watched folder.
     Stirred,
+    /// The reading of this number has got so far.
+    Shapes(u64, Source, Sketchable),
     Read(Box<Finished>),
     Close,
 }
@@ -236,6 +251,11 @@ impl Worker {
             match self.inbox.recv_timeout(pause) {
                 Ok(Note::Open(source)) => self.begin(source),
                 Ok(Note::Cancel) => self.cancel(),
+                Ok(Note::Shapes(number, source, sketchable)) => {
+                    if number == self.number && matches!(self.reading, Some(ReadingOf::Wish)) {
+                        self.tell(LoadEvent::Shapes(source, sketchable));
+                    }
+                }
                 Ok(Note::Read(finished)) => self.finish(*finished),
                 Ok(Note::Stirred) => self.stirred.store(false, Ordering::Release),
                 Err(RecvTimeoutError::Timeout) => {}
@@ -292,7 +312,14 @@ impl Worker {
         let spawned = std::thread::Builder::new().name("read scene".into()).spawn({
             let source = source.clone();
             move || {
-                let result = session::load(&source, &args).map_err(|error| one_line(&error));
+                let sketch = |shapes| {
+                    let (reading, shown) = mpsc::channel();
+                    let sketchable = Sketchable { shapes, _reading: reading };
+                    // Where nobody wants a sketch, the other end is gone at once.
+                    let _ = notes.send(Note::Shapes(number, source.clone(), sketchable));
+                    let _ = shown.recv_timeout(SKETCH);
+                };
+                let result = session::load_showing(&source, &args, sketch).map_err(|error| one_line(&error));
                 // The loader is gone: nobody wants the scene any more.
                 let _ = notes.send(Note::Read(Box::new(Finished { number, source, began, result })));
             }

@@ -82,15 +82,33 @@ pub struct Loaded {
     pub camera: Option<CameraChoice>,
 }
 
+/// What is known of a scene before its images are read.
+#[derive(Clone, Debug)]
+pub struct Shapes {
+    /// Fit for a sketch, as [`tracer::import::load_gltf_showing`] has it.
+    pub scene: Arc<Scene>,
+    /// The camera that the command line asks for.
+    pub camera: Option<CameraChoice>,
+}
+
 /// Loads a scene and puts the environment that was asked for around it. Scene, moment, variant and camera of the command line
 /// are those of the file that it names: they do not count for another one.
 ///
 /// # Errors
 /// When the scene or the environment image cannot be read.
 pub fn load(source: &Source, args: &SceneArgs) -> anyhow::Result<Loaded> {
+    load_showing(source, args, |_| ())
+}
+
+/// As [`load`], and hands on what the scene is before its images are read, which goes on when `show` returns.
+///
+/// # Errors
+/// As [`load`], also after `show` was called.
+pub fn load_showing(source: &Source, args: &SceneArgs, show: impl FnOnce(Shapes)) -> anyhow::Result<Loaded> {
     let is_named = source.is(&Source::from(args.scene.as_deref()));
     let (file, camera) = if is_named { (args.file.clone(), args.camera.clone()) } else { Default::default() };
-    let (mut scene, report) = import(source, &file)?;
+    let (mut scene, report) =
+        import_showing(source, &file, |scene| show(Shapes { scene: Arc::new(scene.clone()), camera: camera.clone() }))?;
     let mut warnings = report.warnings;
     let mut repaired = None;
     let environment = match (&args.background, &args.env) {
@@ -133,10 +151,22 @@ pub fn load(source: &Source, args: &SceneArgs) -> anyhow::Result<Loaded> {
 /// # Errors
 /// When it cannot be read.
 pub fn import(source: &Source, args: &FileArgs) -> anyhow::Result<(Scene, ImportReport)> {
+    import_showing(source, args, |_| ())
+}
+
+fn import_showing(
+    source: &Source,
+    args: &FileArgs,
+    shapes: impl FnOnce(&Scene),
+) -> anyhow::Result<(Scene, ImportReport)> {
     let options = ImportOptions { scene: args.gltf_scene, time_secs: args.time, variant: args.variant.clone() };
     match source {
-        Source::BuiltIn => tracer::builtin::scene().context("the built-in scene"),
-        Source::File(path) => Ok(tracer::import::load_gltf(path, &options)?),
+        Source::BuiltIn => {
+            let (scene, report) = tracer::builtin::scene().context("the built-in scene")?;
+            shapes(&scene);
+            Ok((scene, report))
+        }
+        Source::File(path) => Ok(tracer::import::load_gltf_showing(path, &options, shapes)?),
     }
 }
 

@@ -13,6 +13,8 @@ mod lost;
 mod moving;
 #[path = "films/saving.rs"]
 mod saving;
+#[path = "films/sketched.rs"]
+mod sketched;
 mod support;
 #[path = "films/tev.rs"]
 mod tev;

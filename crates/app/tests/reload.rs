@@ -288,3 +288,38 @@ fn companions_count_and_a_half_written_image_waits_its_time() {
     assert_eq!(loaded(&next()).scene.meshes[0].positions[0].x, 0.25);
     std::fs::remove_dir_all(folder).unwrap();
 }
+
+#[test]
+fn images_wait_for_the_sketch_of_their_scene_but_not_for_ever() {
+    let folder = scratch("shapes");
+    let [path, other] = ["scene.glb", "other.glb"].map(|name| folder.join(name));
+    std::fs::write(&path, glb(7)).unwrap();
+    std::fs::write(&other, glb(8)).unwrap();
+    let loader = loader();
+    let open = |path: &Path| {
+        loader.open(Source::File(path.to_owned()));
+        match wait(&loader, |event| panic!("{event:?} came first"), |event| matches!(event, LoadEvent::Shapes(..))) {
+            LoadEvent::Shapes(_, sketchable) => sketchable,
+            event => panic!("{event:?}"),
+        }
+    };
+    let opened = || wait(&loader, |_| {}, |event| matches!(event, LoadEvent::Opened(..)));
+    let held = open(&path);
+    assert_eq!(held.shapes.scene.instances[0].name, "v00007");
+    std::thread::sleep(Duration::from_millis(200));
+    assert!(loader.poll().is_none() && loader.loading().is_some(), "it waits");
+    drop(held);
+    assert_eq!(version(loaded(&opened())), 7);
+
+    // Whoever keeps the shapes does not keep the scene back.
+    let held = open(&other);
+    assert_eq!(version(loaded(&opened())), 8);
+    assert_eq!(held.shapes.scene.instances[0].name, "v00008");
+
+    // A wish that is not the newest any more is not sketched.
+    let held = open(&path);
+    let newer = open(&other);
+    drop((held, newer));
+    assert_eq!(version(loaded(&opened())), 8);
+    std::fs::remove_dir_all(folder).unwrap();
+}

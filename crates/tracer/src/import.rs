@@ -68,11 +68,25 @@ pub struct ImportOptions {
 /// [`ImportError`] when the file cannot be read, is no glTF 2.0, needs an unsupported extension, or is inconsistent in a
 /// way that leaves nothing sensible to show. Lesser trouble is in the report's warnings.
 pub fn load_gltf(path: &Path, options: &ImportOptions) -> Result<(Scene, ImportReport), ImportError> {
+    load_gltf_showing(path, options, |_| ())
+}
+
+/// As [`load_gltf`], and calls `shapes` with what the scene is before images are decoded and tangents made, which take most of
+/// the time: all is there and in its place, but meshes lack tangents and grey or neutral texels stand for the images. Fit for
+/// [`Renderer::sketch`](crate::renderer::Renderer::sketch). The import goes on when `shapes` returns; all cores are free until then.
+///
+/// # Errors
+/// As [`load_gltf`], also after `shapes` was called.
+pub fn load_gltf_showing(
+    path: &Path,
+    options: &ImportOptions,
+    shapes: impl FnOnce(&Scene),
+) -> Result<(Scene, ImportReport), ImportError> {
     let start = Instant::now();
     let bytes = std::fs::read(path).map_err(|source| ImportError::Read { file: path.to_owned(), source })?;
     let folder = Folder { path: Some(path.parent().unwrap_or(Path::new("")).to_owned()) };
     let name = path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned());
-    let (scene, mut report) = import(&name, path, &folder, &bytes, options, start)?;
+    let (scene, mut report) = import(&name, path, &folder, &bytes, options, (start, shapes))?;
     report.files.insert(0, path.to_owned());
     Ok((scene, report))
 }
@@ -82,7 +96,7 @@ pub fn load_gltf(path: &Path, options: &ImportOptions) -> Result<(Scene, ImportR
 /// # Errors
 /// As [`load_gltf`].
 pub fn load_glb_bytes(name: &str, bytes: &[u8], options: &ImportOptions) -> Result<(Scene, ImportReport), ImportError> {
-    import(name, Path::new(name), &Folder { path: None }, bytes, options, Instant::now())
+    import(name, Path::new(name), &Folder { path: None }, bytes, options, (Instant::now(), |_: &Scene| ()))
 }
 
 fn import(
@@ -91,11 +105,10 @@ fn import(
     folder: &Folder,
     bytes: &[u8],
     options: &ImportOptions,
-    start: Instant,
+    watch: (Instant, impl FnOnce(&Scene)),
 ) -> Result<(Scene, ImportReport), ImportError> {
     let container = Container::parse(file, bytes)?;
-    let imported = import_document(name, folder, &container, options, start).map_err(|fault| fault.in_file(file))?;
-    Ok(imported)
+    import_document(name, folder, &container, options, watch).map_err(|fault| fault.in_file(file))
 }
 
 fn supported(extension: &str) -> bool {
@@ -107,7 +120,7 @@ fn import_document(
     folder: &Folder,
     container: &Container<'_>,
     options: &ImportOptions,
-    start: Instant,
+    (start, shapes): (Instant, impl FnOnce(&Scene)),
 ) -> Result<(Scene, ImportReport), Fault> {
     let document = Document::parse(&container.json, supported)?;
     let mut report = new_report(&document);
@@ -132,16 +145,21 @@ fn import_document(
         &mut report.warnings,
     )?;
 
-    let ((meshes, geometry_secs), (textures, texture_secs)) = rayon::join(
-        || timed(|| graph.requests.par_iter().map(|r| primitive::build(&data, r)).collect::<Result<Vec<_>, _>>()),
-        || timed(|| table.decode(&data, folder)),
-    );
+    let (built, geometry_secs) =
+        timed(|| graph.requests.par_iter().map(|r| primitive::build(&data, r)).collect::<Result<Vec<_>, _>>());
     report.stage_seconds.geometry = geometry_secs;
+    let parts = assemble::Parts { name, graph, built: built?, materials, textures: table.stand_ins() };
+    let (mut scene, tangents_along) = parts.assemble(&document, &mut report)?;
+    shapes(&scene);
+
+    let bare = std::mem::take(&mut scene.meshes);
+    let ((meshes, tangent_secs), (textures, texture_secs)) =
+        rayon::join(|| timed(|| with_tangents(bare, &tangents_along)), || timed(|| table.decode(&data, folder)));
+    report.stage_seconds.tangents = tangent_secs;
     report.stage_seconds.textures = texture_secs;
     let decoded = textures?;
+    (scene.meshes, scene.textures) = (meshes, decoded.textures);
     report.files.extend(decoded.files);
-    let parts = assemble::Parts { name, graph, built: meshes?, materials, textures: decoded.textures };
-    let scene = parts.assemble(&document, &mut report)?;
     report.warnings.extend(decoded.warnings);
     report.stage_seconds.total = start.elapsed().as_secs_f64();
     Ok((scene, report))
@@ -190,6 +208,15 @@ fn choose_variant(document: &Document<'_>, options: &ImportOptions) -> Result<Op
         let cause = ContentError::UnknownVariant { asked: asked.clone(), known: document.variants.clone() };
         Fault::new("KHR_materials_variants", cause)
     })
+}
+
+/// Meshes with the tangents that some of them lack.
+fn with_tangents(meshes: Vec<Arc<Mesh>>, along: &[Option<usize>]) -> Vec<Arc<Mesh>> {
+    let made = meshes.into_par_iter().zip(along).with_max_len(1).map(|(mesh, along)| match along {
+        Some(uv_set) => Arc::new(primitive::with_tangents(Arc::unwrap_or_clone(mesh), *uv_set)),
+        None => mesh,
+    });
+    made.collect()
 }
 
 /// The hashes of meshes, computed in parallel.

@@ -8,7 +8,7 @@ use std::f32::consts::FRAC_1_SQRT_2;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use import_support::{File, floats, png};
 use serde_json::json;
-use tracer::import::{ImportOptions, ImportWarning, load_gltf};
+use tracer::import::{ImportOptions, ImportWarning, load_gltf, load_gltf_showing};
 use tracer::scene::{AlphaMode, Projection, PunctualKind, Scene, TexelEncoding, TextureRef, WrapMode};
 
 fn world_positions(scene: &Scene, instance: usize) -> Vec<Vec3> {
@@ -522,4 +522,30 @@ fn companions_with_spaces_and_other_letters() {
     assert_eq!(report.files.len(), 4, "{:?}", report.files);
     let message = broken.unwrap_err().to_string();
     assert!(message.contains("buffer 0 'le%20tampon.bin': cannot be read: "), "{message}");
+}
+
+#[test]
+fn shapes_are_shown_before_images_are_read() {
+    let mut file = File::triangle().with_uvs();
+    let view = file.view(b"no image at all");
+    file.push("images", json!({"bufferView": view}));
+    file.push("textures", json!({"source": 0}));
+    file.material(json!({"normalTexture": {"index": 0}, "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}));
+    let path = std::env::temp_dir().join(format!("shapes-{}.glb", std::process::id()));
+    std::fs::write(&path, file.glb()).unwrap();
+    let mut shapes = Vec::new();
+    let (scene, report) =
+        load_gltf_showing(&path, &ImportOptions::default(), |scene| shapes.push(scene.clone())).unwrap();
+    std::fs::remove_file(&path).unwrap();
+    let [shapes] = shapes.as_slice() else { panic!("called {} times", shapes.len()) };
+
+    let replaced = |w: &ImportWarning| matches!(w, ImportWarning::ImageReplaced { .. });
+    assert!(report.warnings.iter().any(replaced), "images were read: {:?}", report.warnings);
+    assert_eq!((shapes.bounds(), &shapes.instances), (scene.bounds(), &scene.instances));
+    assert_eq!((shapes.meshes[0].tangents.len(), scene.meshes[0].tangents.len()), (0, 3));
+    assert_ne!(shapes.meshes[0].hash, scene.meshes[0].hash);
+    assert_eq!(shapes.textures.len(), scene.textures.len(), "no material refers to what is not there");
+    let texel_of = |it: Option<TextureRef>| shapes.textures[it.unwrap().texture as usize].texels.clone();
+    assert_eq!(texel_of(shapes.materials[0].base_color_texture), [[188, 188, 188, 255]], "half of the light");
+    assert_eq!(texel_of(shapes.materials[0].normal_texture), [[128, 128, 255, 255]], "flat");
 }

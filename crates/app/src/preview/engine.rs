@@ -23,6 +23,7 @@ use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
 use crate::convergence::{Convergence, Follower};
 use crate::gaze::hub::{GazeHub, SampleTimes};
+use crate::reload::Sketchable;
 use crate::session::one_line;
 use crate::tev::TevLink;
 
@@ -38,19 +39,22 @@ mod priority;
 mod rate;
 mod readout;
 mod saving;
+mod shown;
 mod sketch;
 
 use devices::Screen;
 pub use devices::{Devices, Picture};
-use motion::{Motion, SEEN_SMOOTHER};
+use motion::Motion;
 pub(super) use priority::give_way;
 use rate::Rate;
 pub use readout::{HeadsetReadout, Message, ShownVersion};
 pub use saving::Destination;
 use saving::Saving;
+use shown::Shown;
+use sketch::Sketched;
 
 /// How long a thread with nothing to trace sleeps between looks at what the window wants.
-const IDLE: Duration = Duration::from_millis(50);
+const IDLE: Duration = Duration::from_millis(10);
 /// How often figures are read from the device.
 const READ_INTERVAL: Duration = Duration::from_millis(500);
 /// From this tracing time of a film on its picture is denoised.
@@ -132,6 +136,8 @@ struct Shared {
     look: Mutex<Option<Look>>,
     /// The newest version of the scene, until the thread takes it.
     version: Mutex<Option<Arc<Scene>>>,
+    /// Shapes of a scene that is still being read, until the thread takes them.
+    shapes: Mutex<Option<Sketchable>>,
     state: Mutex<State>,
     /// What another device needs when this one is lost.
     survivors: Mutex<Survivors>,
@@ -198,6 +204,7 @@ impl Engine {
             failed: None,
             keeper: Keeper::new(Instant::now()),
             awaits_scene: None,
+            sketched: None,
             tev: tev.transpose()?,
         };
         let thread = std::thread::Builder::new().name("engine".into()).spawn(move || worker.run())?;
@@ -214,6 +221,11 @@ impl Engine {
     pub fn set_scene(&self, version: Arc<Scene>) {
         lock(&self.shared.survivors).scene = Some(Arc::clone(&version));
         *lock(&self.shared.version) = Some(version);
+    }
+
+    /// Sketches a scene that is still being read, until there is one to trace.
+    pub fn sketch(&self, shapes: Sketchable) {
+        *lock(&self.shared.shapes) = Some(shapes);
     }
 
     /// What another engine can go on with.
@@ -288,6 +300,7 @@ struct Worker {
     keeper: Keeper,
     /// A film to go on with as soon as there is a scene.
     awaits_scene: Option<Arc<FilmSnapshot>>,
+    sketched: Option<Sketched>,
     tev: Option<TevLink>,
 }
 
@@ -310,8 +323,11 @@ impl Worker {
                 continue;
             }
             self.take_version();
-            let look = lock(&self.shared.look).clone();
-            let Some(look) = look.filter(|_| self.tracing.is_open()) else { continue };
+            let Some(look) = lock(&self.shared.look).clone() else { continue };
+            if !self.tracing.is_open() {
+                self.sketch_shapes(&look);
+                continue;
+            }
             if self.failed.as_ref() == Some(&look) {
                 continue;
             }
@@ -338,7 +354,7 @@ impl Worker {
         if prepares {
             self.busy(Some("preparing the scene".into()));
             // What stands in a sketch's way stands in the scene's too, and is told with that.
-            let _ = self.show_sketch(look);
+            let _ = self.sketch_scene(look);
         }
         // The window may have been drawn long ago; the eye has moved since.
         let target = self.gaze.target_for_batch(Instant::now(), &look.standpoint.view);
@@ -386,24 +402,6 @@ impl Worker {
             tev.push(|| self.tracing.radiance())?;
         }
         Ok(())
-    }
-
-    /// A picture is due when what it shows has changed, or when its share of the time has come.
-    fn is_due(&self, look: &Look) -> bool {
-        let Some(shown) = &self.shown else { return true };
-        let last = &shown.look;
-        let now = Instant::now();
-        shown.coarseness > self.motion.coarseness(now, self.show_time)
-            || look.controls.paused
-                && shown.smoothing > SEEN_SMOOTHER * self.motion.smoothing(now, self.tracing.samples(), look.size_px)
-            || last.standpoint != look.standpoint
-            || last.size_px != look.size_px
-            || last.controls != look.controls
-            || self.tracing.is_unfinished()
-            || shown.is_guided != self.tracing.is_guided(look)
-            || look.controls.paused && shown.is_guided == Some(false)
-            || shown.samples != self.tracing.samples()
-                && shown.at.elapsed() >= self.pacing.show_interval(self.show_time)
     }
 
     fn show(&mut self, look: &Look) -> anyhow::Result<()> {
@@ -573,20 +571,6 @@ impl Worker {
         lock(&self.shared.state).message = Some(Message::now(text, wrong));
         (self.repaint)();
     }
-}
-
-/// The picture on screen.
-struct Shown {
-    look: Look,
-    /// In the film at that time.
-    samples: u64,
-    /// Pixels a texel along each axis.
-    coarseness: u32,
-    /// Samples at which a pixel counts as much as what is around it.
-    smoothing: f32,
-    /// As [`Tracing::is_guided`] had it.
-    is_guided: Option<bool>,
-    at: Instant,
 }
 
 /// The window is gone.

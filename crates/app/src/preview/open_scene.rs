@@ -1,12 +1,11 @@
 //! What the window knows of the scene that it shows.
 
-use std::sync::Arc;
-
 use glam::Vec3;
 use tracer::scene::Scene;
 
 use super::controls::metric;
-use crate::session::{self, Loaded, Viewpoint};
+use crate::cli::values::CameraChoice;
+use crate::session::{self, Loaded, Shapes, Viewpoint};
 
 /// A scene on screen.
 #[derive(Clone, Debug)]
@@ -28,10 +27,17 @@ pub struct OpenScene {
 impl OpenScene {
     /// From what was loaded; a camera that does not exist is a note.
     pub fn new(loaded: &Loaded) -> Self {
-        let scene: &Arc<Scene> = &loaded.scene;
-        let mut notes = loaded.notes.clone();
+        Self::of(&loaded.scene, loaded.camera.as_ref(), loaded.notes.clone())
+    }
+
+    /// From what is known before images are read.
+    pub fn sketched(shapes: &Shapes) -> Self {
+        Self::of(&shapes.scene, shapes.camera.as_ref(), Vec::new())
+    }
+
+    fn of(scene: &Scene, camera: Option<&CameraChoice>, mut notes: Vec<String>) -> Self {
         let viewpoints = session::viewpoints(scene);
-        let start = session::choose(&viewpoints, loaded.camera.as_ref()).unwrap_or_else(|error| {
+        let start = session::choose(&viewpoints, camera).unwrap_or_else(|error| {
             notes.insert(0, session::one_line(&error));
             0
         });

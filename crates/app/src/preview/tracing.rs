@@ -68,8 +68,6 @@ struct Open {
     scene: Arc<Scene>,
     renderer: Option<Renderer>,
     plan: Option<FilmPlan>,
-    /// A renderer that has the scene's geometry, and will trace it by this plan.
-    sketched: Option<(Renderer, FilmPlan)>,
 }
 
 struct Target {
@@ -82,6 +80,8 @@ pub struct Tracing {
     gpu: Gpu,
     args: PreviewArgs,
     open: Option<Open>,
+    /// A renderer that has the geometry of the scene to come, and an empty film.
+    sketched: Option<Renderer>,
     target: Option<Target>,
     generations: u64,
     inverse: Option<(Acuity, Arc<Inverse>)>,
@@ -108,6 +108,7 @@ impl Tracing {
             gpu,
             args,
             open: None,
+            sketched: None,
             target: None,
             generations: 0,
             inverse: None,
@@ -144,7 +145,7 @@ impl Tracing {
                     side.follow_scene(renderer)?;
                 }
             }
-            _ => self.open = Some(Open { scene, renderer: None, plan: None, sketched: None }),
+            _ => self.open = Some(Open { scene, renderer: None, plan: None }),
         }
         self.traced = Duration::ZERO;
         Ok(())
@@ -154,6 +155,7 @@ impl Tracing {
     /// that fails.
     pub fn go_on(&mut self, film: &FilmSnapshot) -> anyhow::Result<()> {
         let inverse = self.inverse(self.args.sampling.acuity())?;
+        self.sketched = None;
         let open = self.open.as_mut().context("no scene is open")?;
         let everywhere = Distribution::omnidirectional(inverse);
         let mut renderer = Renderer::new(&self.gpu, &film.header.renderer_options(), everywhere)?;
@@ -256,12 +258,13 @@ impl Tracing {
                 renderer.set_distribution(distribution)?;
             }
             None => {
-                let mut renderer = match open.sketched.take() {
-                    Some((mut renderer, of)) if of == plan => {
+                let mut renderer = match self.sketched.take() {
+                    Some(mut renderer) => {
+                        renderer.set_film(plan.options)?;
                         renderer.set_distribution(distribution)?;
                         renderer
                     }
-                    _ => Renderer::new(&self.gpu, &renderer_options(&self.args, plan), distribution)?,
+                    None => Renderer::new(&self.gpu, &renderer_options(&self.args, plan), distribution)?,
                 };
                 renderer.set_schedule(self.args.sampling.schedule.on(&self.gpu))?;
                 self.scene_report = Some(timed_set_scene(&mut renderer, &open.scene)?);
@@ -371,8 +374,9 @@ impl Tracing {
 
     fn give_up_film(&mut self) {
         if let Some(open) = &mut self.open {
-            (open.renderer, open.plan, open.sketched) = (None, None, None);
+            (open.renderer, open.plan) = (None, None);
         }
+        self.sketched = None;
         self.keeps_film = false;
         self.beside = None;
     }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
 use egui::{Context, Rect, Sense, Ui};
-use glam::{Quat, UVec2, Vec2, Vec3};
-use tracer::film::{FilmHeader, FilmMapping, FilmSnapshot};
+use glam::{UVec2, Vec2, Vec3};
+use tracer::film::FilmSnapshot;
 use tracer::scene::Scene;
 
 use super::attention_tools::{self, ToolState};
@@ -20,22 +20,23 @@ use super::gaze::{self, Gaze, ScreenMapping, fovea_ring};
 use super::gaze_control::GazeControl;
 use super::gaze_panel;
 use super::legend;
-use super::navigation::Navigation;
+use super::navigation::{Navigation, point_in_view};
 use super::open_scene::OpenScene;
 use super::overlay::{self, Action, Facts, Visibility};
 use super::screenshot::Screenshot;
 use super::seeing;
 use super::split_panel::{self, SplitTimes};
-use super::unsaved::{Decision, Next, Unsaved};
+use super::unsaved::Unsaved;
 use super::versions::Versions;
 use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
 use crate::preferences::Store;
-use crate::reload::{LoadEvent, Loader};
-use crate::session::{Loaded, Source};
+use crate::reload::Loader;
+use crate::session::Source;
 
 mod files;
 mod keys;
+mod opening;
 
 /// How long a note stays.
 const NOTE: Duration = Duration::from_secs(5);
@@ -57,8 +58,10 @@ pub struct Window {
     controls: Controls,
     visibility: Visibility,
     gaze: GazeControl,
-    /// The scene that the navigation moves in.
+    /// The scene that the navigation moves in; without an editor it is a sketch of one that is still being read.
     scene: Option<(OpenScene, Navigation)>,
+    /// Where that sketch is from.
+    sketched: Option<Source>,
     tools: ToolState,
     split: SplitTimes,
     /// Where one looks as far as tracing goes, in the scene.
@@ -104,6 +107,7 @@ impl Window {
             visibility,
             gaze,
             scene: None,
+            sketched: None,
             tools: ToolState::default(),
             split: SplitTimes::default(),
             gaze_direction: None,
@@ -144,103 +148,6 @@ impl Window {
         self.unsaved.renew();
         self.note =
             Some(Message::now("the graphics device was lost; the film goes on from its last snapshot".into(), false));
-    }
-
-    /// Takes what the loader has: a new scene starts from its camera, a new version of the same one keeps the view.
-    fn follow_loader(&mut self, rect: Rect) {
-        while !self.unsaved.is_asking()
-            && let Some(event) = self.loader.poll()
-        {
-            match event {
-                LoadEvent::Opened(source, loaded) => {
-                    let is_present = self.editor.as_ref().is_some_and(|editor| *editor.source() == source);
-                    if std::mem::take(&mut self.going_back) && is_present {
-                        self.follow_file(&loaded);
-                    } else {
-                        let next = Next::Show(Box::new((source, loaded)));
-                        let allowed = self.unsaved.allow(next, self.editor.as_ref());
-                        allowed.into_iter().for_each(|next| self.go_on(next, rect));
-                    }
-                }
-                LoadEvent::Changed(_) | LoadEvent::Broken(_) if self.going_back => {}
-                LoadEvent::Changed(loaded) => self.follow_file(&loaded),
-                LoadEvent::NotOpened(text) => {
-                    self.unsaved.keep();
-                    self.note = Some(Message::now(text, true));
-                }
-                LoadEvent::Broken(text) => self.broken = Some(text),
-                LoadEvent::Environment(path, result) => {
-                    if let Some(editor) = &mut self.editor {
-                        editor.take_environment(path, result);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Opens a scene, after a question where that would lose edits.
-    fn open_scene(&mut self, source: Source) {
-        if let Some(Next::Open(source)) = self.unsaved.allow(Next::Open(source), self.editor.as_ref()) {
-            self.loader.open(source);
-        }
-    }
-
-    /// Asks whether edits may be lost, and does what is decided.
-    fn ask(&mut self, ctx: &Context, rect: Rect) {
-        match self.unsaved.ask(ctx, self.editor.as_mut()) {
-            Some(Decision::GoOn(next)) => self.go_on(next, rect),
-            // The loader follows the files of the other scene by now.
-            Some(Decision::Stay(Next::Show(_))) => {
-                if let Some(editor) = &self.editor {
-                    self.going_back = true;
-                    self.loader.open(editor.source().clone());
-                }
-            }
-            Some(Decision::Stay(Next::Close | Next::Open(_))) | None => {}
-        }
-    }
-
-    fn go_on(&mut self, next: Next, rect: Rect) {
-        match next {
-            // It closes by itself.
-            Next::Close => {}
-            Next::Open(source) => self.loader.open(source),
-            Next::Show(opened) => {
-                let (source, loaded) = *opened;
-                self.open(&source, &loaded, rect);
-                self.add_recent(&source);
-            }
-        }
-    }
-
-    fn open(&mut self, source: &Source, loaded: &Loaded, rect: Rect) {
-        self.unsaved.keep();
-        let open = OpenScene::new(loaded);
-        let aspect = rect.width() / rect.height().max(1.0);
-        // What there was to say before there was anything to see is said now.
-        self.note = self.files.trouble.take().map(|text| Message::now(text, false));
-        self.broken = None;
-        if let Some(start) = open.viewpoints.get(open.start) {
-            let mut navigation = Navigation::new(start.position, start.rotation, start.vfov, aspect, open.diagonal);
-            self.camera = open.start;
-            if let Some(film) = self.resumed.take() {
-                let (rotation, vfov) = looking_at(&film.header, (start.rotation, start.vfov), aspect);
-                navigation.jump(film.header.pose.position, rotation, vfov);
-                self.engine.request(Request::GoOn(film));
-            }
-            self.scene = Some((open, navigation));
-            self.editor = Some(Editor::open(source, loaded));
-        }
-    }
-
-    fn follow_file(&mut self, loaded: &Loaded) {
-        self.broken = None;
-        if let (Some((open, navigation)), Some(editor)) = (&mut self.scene, &mut self.editor) {
-            *open = OpenScene::new(loaded);
-            navigation.set_scale(open.diagonal);
-            self.camera = self.camera.min(open.viewpoints.len().saturating_sub(1));
-            editor.follow_file(loaded);
-        }
     }
 
     /// Gives the engine the document's version and asks the loader for what that lacks.
@@ -347,6 +254,7 @@ impl Window {
                 if overlay::loading(ctx, &loading.name, elapsed, self.scene.is_some()) {
                     self.loader.cancel();
                     self.unsaved.keep();
+                    self.give_up_sketch();
                 }
                 ctx.request_repaint_after(WORTH_SAYING);
                 return;
@@ -444,17 +352,28 @@ impl eframe::App for Window {
             // Both eyes see one film, and it comes back as it is.
             self.controls.comparison = None;
         }
-        if let (Some((_, navigation)), Some(editor)) = (&mut self.scene, &mut self.editor) {
-            let attention = &mut self.controls.attention;
-            let standpoint = navigation.standpoint;
-            let is_views = navigation.dragging() || ctx.input(|input| input.modifiers.alt);
-            let used = !is_views && attention_tools::point(&response, &standpoint, self.tools, attention);
-            if !used {
-                editor.point(ui, &response, &standpoint);
+        match (&mut self.scene, &mut self.editor) {
+            (Some((_, navigation)), Some(editor)) => {
+                let attention = &mut self.controls.attention;
+                let standpoint = navigation.standpoint;
+                let is_views = navigation.dragging() || ctx.input(|input| input.modifiers.alt);
+                let used = !is_views && attention_tools::point(&response, &standpoint, self.tools, attention);
+                if !used {
+                    editor.point(ui, &response, &standpoint);
+                }
+                if !used && !editor.holds_pointer() {
+                    navigation.update(ui, &response, |pointer| editor.pivot(pointer, rect, &standpoint));
+                }
             }
-            if !used && !editor.holds_pointer() {
-                navigation.update(ui, &response, |pointer| editor.pivot(pointer, rect, &standpoint));
+            // A sketch can be walked about in.
+            (Some((open, navigation)), None) => {
+                let standpoint = navigation.standpoint;
+                navigation.update(ui, &response, |pointer| {
+                    let direction = standpoint.view.direction_at(point_in_view(rect, pointer));
+                    standpoint.position + 0.5 * open.diagonal * direction
+                });
             }
+            (None, _) => {}
         }
         let now = Instant::now();
         let view = self.scene.as_ref().map(|(_, navigation)| navigation.standpoint.view);
@@ -466,7 +385,9 @@ impl eframe::App for Window {
         if let Some(target) = target {
             self.controls.acuity.gaze_error_deg = target.accuracy_deg;
         }
-        if let (Some(picture), Some(render_state)) = (&state.picture, frame.wgpu_render_state()) {
+        // Without a scene the picture is a sketch of one that could not be opened.
+        let picture = state.picture.as_ref().filter(|_| self.scene.is_some());
+        if let (Some(picture), Some(render_state)) = (picture, frame.wgpu_render_state()) {
             ui.painter().add(canvas::shape(picture.clone(), rect, render_state.target_format));
         }
         let mut deg_per_px = 0.0;
@@ -530,15 +451,5 @@ impl eframe::App for Window {
 
     fn clear_color(&self, _visuals: &egui::Visuals) -> [f32; 4] {
         [0.04, 0.04, 0.045, 1.0]
-    }
-}
-
-/// Where to look on a film, with a vertical angle that stays on it: a panorama as given, else along its axis.
-fn looking_at(film: &FilmHeader, otherwise: (Quat, f32), aspect: f32) -> (Quat, f32) {
-    match film.options.mapping {
-        FilmMapping::Equirect => otherwise,
-        FilmMapping::Perspective { half_extent: [x, y] } => {
-            (film.pose.world_from_film, 2.0 * y.min(x / aspect.max(1e-3)).atan())
-        }
     }
 }

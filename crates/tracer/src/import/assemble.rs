@@ -33,16 +33,23 @@ pub(super) struct Parts<'a> {
 }
 
 impl Parts<'_> {
-    pub(super) fn assemble(self, document: &Document<'_>, report: &mut ImportReport) -> Result<Scene, Fault> {
+    /// The scene, and for each of its meshes the texture coordinate set along which it lacks tangents.
+    pub(super) fn assemble(
+        self,
+        document: &Document<'_>,
+        report: &mut ImportReport,
+    ) -> Result<(Scene, Vec<Option<usize>>), Fault> {
         let Self { name, mut graph, built, materials, textures } = self;
         warn_of_missing_uvs(&graph, &built, &materials, report);
         let mut mesh_of_request = Vec::with_capacity(built.len());
         let mut meshes: Vec<Mesh> = Vec::new();
+        let mut tangents_along = Vec::new();
         for built in built {
             report.degenerate_triangles += built.degenerate_triangles;
             report.warnings.extend(built.warnings);
             mesh_of_request.push(built.mesh.map(|mesh| {
                 meshes.push(mesh);
+                tangents_along.push(built.tangents_along);
                 meshes.len() - 1
             }));
         }
@@ -100,7 +107,7 @@ impl Parts<'_> {
             scene.environment = Environment::Constant(NEUTRAL_SKY);
             report.warnings.push(ImportWarning::NoLight);
         }
-        Ok(scene)
+        Ok((scene, tangents_along))
     }
 }
 

@@ -57,10 +57,12 @@ impl MeshRequest<'_> {
     }
 }
 
-/// A mesh and what its making met. `mesh` has no hash yet.
+/// A mesh and what its making met.
 pub(super) struct Built {
-    /// `None` when no triangle is left.
+    /// Without a hash and without tangents that are not in the file; `None` when no triangle is left.
     pub(super) mesh: Option<Mesh>,
+    /// The texture coordinate set along which tangents are to be made.
+    pub(super) tangents_along: Option<usize>,
     pub(super) degenerate_triangles: usize,
     pub(super) warnings: Vec<ImportWarning>,
 }
@@ -88,6 +90,12 @@ impl Vertices {
         push(&mut self.colors, vertex);
         self.uvs.iter_mut().for_each(|uvs| push(uvs, vertex));
         u32::try_from(self.positions.len() - 1).expect("indices are u32, and each splits into at most one vertex")
+    }
+
+    /// These and triangles of them, without a hash.
+    fn into_mesh(self, name: String, triangles: Vec<[u32; 3]>) -> Mesh {
+        let Self { positions, normals, tangents, uvs, colors } = self;
+        Mesh { name, positions, normals, tangents, uvs, colors, triangles, hash: ContentHash::default() }
     }
 
     /// One vertex per triangle corner.
@@ -124,7 +132,7 @@ pub(super) fn build(data: &Data<'_>, request: &MeshRequest<'_>) -> Result<Built,
         warnings.push(ImportWarning::DegenerateTriangles { place, count: degenerate_triangles });
     }
     if triangles.is_empty() {
-        return Ok(Built { mesh: None, degenerate_triangles, warnings });
+        return Ok(Built { mesh: None, tangents_along: None, degenerate_triangles, warnings });
     }
 
     if vertices.normals.is_empty() {
@@ -135,16 +143,20 @@ pub(super) fn build(data: &Data<'_>, request: &MeshRequest<'_>) -> Result<Built,
             warnings.push(ImportWarning::NormalsRepaired { place: primitive.place.clone(), count });
         }
     }
-    match request.tangent_uv_set {
-        Some(set) if vertices.tangents.is_empty() && !vertices.uvs[set as usize].is_empty() => {
-            tangent::generate(&mut vertices, &mut triangles, set as usize);
-        }
-        _ => {}
-    }
-    let Vertices { positions, normals, tangents, uvs, colors } = vertices;
-    let (name, hash) = (request.name.clone(), ContentHash::default());
-    let mesh = Mesh { name, positions, normals, tangents, uvs, colors, triangles, hash };
-    Ok(Built { mesh: Some(mesh), degenerate_triangles, warnings })
+    let is_needed = |set: &usize| vertices.tangents.is_empty() && !vertices.uvs[*set].is_empty();
+    let tangents_along = request.tangent_uv_set.map(|set| set as usize).filter(is_needed);
+    let mesh = vertices.into_mesh(request.name.clone(), triangles);
+    Ok(Built { mesh: Some(mesh), tangents_along, degenerate_triangles, warnings })
+}
+
+/// Gives a mesh tangents along a set of texture coordinates; its triangles stay in their places.
+pub(super) fn with_tangents(mesh: Mesh, uv_set: usize) -> Mesh {
+    let Mesh { name, positions, normals, tangents, uvs, colors, mut triangles, .. } = mesh;
+    let mut vertices = Vertices { positions, normals, tangents, uvs, colors };
+    tangent::generate(&mut vertices, &mut triangles, uv_set);
+    let mut mesh = vertices.into_mesh(name, triangles);
+    mesh.hash = hash(&mesh);
+    mesh
 }
 
 /// The hash of all that a mesh contains but its name.

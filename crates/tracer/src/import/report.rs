@@ -45,13 +45,15 @@ pub struct SceneNode {
     pub world_from_node: Affine3A,
 }
 
-/// Wall-clock time of the stages of an import, seconds. Geometry and textures run at the same time.
+/// Wall-clock time of the stages of an import, seconds. Tangents and textures are made at the same time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ImportSeconds {
     /// Reading the file and its buffers, parsing its JSON.
     pub read: f64,
     /// Building meshes.
     pub geometry: f64,
+    /// Making the tangents that the file lacks.
+    pub tangents: f64,
     /// Reading and decoding images.
     pub textures: f64,
     /// All of it.

@@ -89,6 +89,15 @@ impl TextureTable {
         })
     }
 
+    /// A texel for each of what was asked for, until it is decoded: grey where colours will be.
+    pub(super) fn stand_ins(&self) -> Vec<Arc<Texture>> {
+        let stand_in = |&(_, usage): &(usize, TextureUse)| {
+            let texel = if usage == TextureUse::Color { [188, 188, 188, 255] } else { usage.neutral() };
+            Arc::new(texture(String::new(), [1, 1], vec![texel], usage.encoding()))
+        };
+        self.requests.iter().map(stand_in).collect()
+    }
+
     /// Decodes what was asked for, in parallel. Missing and undecodable images become neutral texels and warnings.
     pub(super) fn decode(&self, data: &Data<'_>, folder: &Folder) -> Result<Decoded, Fault> {
         let mut uses_of_image: Vec<(usize, Vec<usize>)> = Vec::new();
@@ -153,15 +162,18 @@ impl TextureTable {
             }
             let own = if i + 1 == uses.len() { shared.take() } else { shared.clone() };
             let texels = own.map_or_else(|| vec![usage.neutral()], |texels| texels_for(usage, texels));
-            let encoding = usage.encoding();
-            let header = [width, height, u32::from(encoding == TexelEncoding::Linear)];
-            let hash = ContentHash::of(&[bytemuck::bytes_of(&header), bytemuck::cast_slice(&texels)]);
-            let texture = Arc::new(Texture { name: name.clone(), width, height, texels, encoding, hash });
+            let texture = Arc::new(texture(name.clone(), [width, height], texels, usage.encoding()));
             made.insert(usage.texels_as(), Arc::clone(&texture));
             texture
         });
         Ok((textures.collect(), warnings))
     }
+}
+
+fn texture(name: String, [width, height]: [u32; 2], texels: Vec<[u8; 4]>, encoding: TexelEncoding) -> Texture {
+    let header = [width, height, u32::from(encoding == TexelEncoding::Linear)];
+    let hash = ContentHash::of(&[bytemuck::bytes_of(&header), bytemuck::cast_slice(&texels)]);
+    Texture { name, width, height, texels, encoding, hash }
 }
 
 fn texels_for(usage: TextureUse, mut texels: Vec<[u8; 4]>) -> Vec<[u8; 4]> {

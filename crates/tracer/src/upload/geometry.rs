@@ -35,8 +35,6 @@ pub(super) struct Split {
 
 /// A run of the scene that has one hierarchy: the static mesh, or a mesh that is placed.
 struct Piece {
-    /// Of what the hierarchy is built from.
-    hash: ContentHash,
     positions: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
     vertices: Vec<layout::Vertex>,
@@ -147,8 +145,9 @@ impl Shapes {
         if has_static {
             pieces.push(static_piece(scene, &split.fixed));
         }
-        let mut blas = build_hierarchies(&pieces, kind, cache);
-        *cache = pieces.iter().zip(&blas).map(|(piece, blas)| (piece.hash, blas.clone())).collect();
+        let blas = build_hierarchies(&pieces, kind, cache);
+        *cache = blas.iter().cloned().collect();
+        let mut blas: Vec<Arc<Blas>> = blas.into_iter().map(|(_, blas)| blas).collect();
         shapes.reserve(&pieces, &blas);
         if has_static && let (Some(piece), Some(blas)) = (pieces.last(), blas.pop()) {
             shapes.static_mesh = Some(shapes.push_piece(piece, blas));
@@ -198,8 +197,8 @@ impl Shapes {
         }
         let (hashes, pieces) = self.missing_pieces(scene, split);
         let blas = build_hierarchies(&pieces, kind, cache);
-        cache.extend(pieces.iter().zip(&blas).map(|(piece, blas)| (piece.hash, blas.clone())));
-        self.push_placed(hashes, &pieces, blas);
+        cache.extend(blas.iter().cloned());
+        self.push_placed(hashes, &pieces, blas.into_iter().map(|(_, blas)| blas).collect());
         Some(growth)
     }
 
@@ -282,10 +281,26 @@ fn runs(within: Range<u32>, belongs: impl Fn(u32) -> bool) -> Vec<Range<u32>> {
     runs
 }
 
-/// The pieces' hierarchies; builds those that are new on all cores.
-fn build_hierarchies(pieces: &[Piece], kind: HierarchyKind, known: &BlasCache) -> Vec<Arc<Blas>> {
+/// The pieces' hierarchies by the hash of their corners; builds those that are new on all cores.
+fn build_hierarchies(pieces: &[Piece], kind: HierarchyKind, known: &BlasCache) -> Vec<(ContentHash, Arc<Blas>)> {
     let build = |p: &Piece| Arc::new(Blas::build(kind, &p.positions, &p.triangles));
-    pieces.par_iter().map(|p| known.get(&p.hash).cloned().unwrap_or_else(|| build(p))).collect()
+    let hierarchy = |p: &Piece| {
+        let hash = p.corners_hash();
+        (hash, known.get(&hash).cloned().unwrap_or_else(|| build(p)))
+    };
+    pieces.par_iter().map(hierarchy).collect()
+}
+
+impl Piece {
+    /// Of all that a hierarchy is built from. What vertices hold beside their positions does not count, nor which triangles share
+    /// them: meshes that were given tangents keep their hierarchies.
+    fn corners_hash(&self) -> ContentHash {
+        let corner = |&vertex: &u32| self.positions[vertex as usize];
+        self.triangles.iter().fold(ContentHash::default(), |hash, triangle| {
+            let corners: [Vec3; 3] = std::array::from_fn(|i| corner(&triangle[i]));
+            hash.mix(bytemuck::cast_slice(&corners))
+        })
+    }
 }
 
 /// What the shape of a placed mesh depends on.
@@ -295,7 +310,6 @@ pub(super) fn placed_hash(scene: &Scene, mesh: u32, passing: &[bool]) -> Content
 
 fn own_piece(mesh: &Mesh, passes_light: bool) -> Piece {
     Piece {
-        hash: mesh.hash,
         positions: mesh.positions.clone(),
         triangles: mesh.triangles.clone(),
         vertices: vertices::encode(mesh, None, codes::NONE).collect(),
@@ -331,9 +345,7 @@ fn static_piece(scene: &Scene, fixed: &[u32]) -> Piece {
             let instance = &scene.instances[source as usize];
             let mesh = &scene.meshes[instance.mesh as usize];
             let mirrored = instance.world_from_mesh.matrix3.determinant() < 0.0;
-            let matrix = instance.world_from_mesh.to_cols_array();
             Piece {
-                hash: mesh.hash.mix(bytemuck::cast_slice(&matrix)),
                 positions: mesh.positions.iter().map(|&p| instance.world_from_mesh.transform_point3(p)).collect(),
                 // A mirror reverses the winding; in world space the order of corners says the same.
                 triangles: mesh
@@ -347,7 +359,6 @@ fn static_piece(scene: &Scene, fixed: &[u32]) -> Piece {
         })
         .collect();
     let mut whole = Piece {
-        hash: ContentHash::of(&[b"static"]),
         positions: Vec::with_capacity(parts.iter().map(|p| p.positions.len()).sum()),
         triangles: Vec::with_capacity(parts.iter().map(|p| p.triangles.len()).sum()),
         vertices: Vec::with_capacity(parts.iter().map(|p| p.vertices.len()).sum()),
@@ -355,11 +366,76 @@ fn static_piece(scene: &Scene, fixed: &[u32]) -> Piece {
     };
     for part in parts {
         let base = whole.positions.len() as u32;
-        whole.hash = whole.hash.mix(&part.hash.0.to_le_bytes());
         whole.positions.extend_from_slice(&part.positions);
         whole.triangles.extend(part.triangles.iter().map(|t| t.map(|v| v + base)));
         whole.vertices.extend_from_slice(&part.vertices);
         whole.numbers.extend_from_slice(&part.numbers);
     }
     whole
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use glam::{Affine3A, DVec3, Vec4};
+
+    use super::*;
+    use crate::scene::{Backdrop, Environment, Material};
+
+    /// Two triangles with a seam, placed twice: by the static mesh, and by itself.
+    fn scene(triangles: Vec<[u32; 3]>, tangents: Vec<Vec4>) -> Scene {
+        let corners = [Vec3::ZERO, Vec3::X, Vec3::ONE, Vec3::Y, Vec3::X, Vec3::ONE];
+        let positions = corners[..triangles.as_flattened().iter().max().map_or(0, |&last| last as usize + 1)].to_vec();
+        let normals = vec![Vec3::Z; positions.len()];
+        let hash = ContentHash::of(&[bytemuck::cast_slice(&triangles), bytemuck::cast_slice(&tangents)]);
+        let mesh = Mesh {
+            name: String::new(),
+            positions,
+            normals,
+            tangents,
+            uvs: Default::default(),
+            colors: Vec::new(),
+            triangles,
+            hash,
+        };
+        let place = |x: f32| Instance {
+            name: String::new(),
+            mesh: 0,
+            material: 0,
+            world_from_mesh: Affine3A::from_translation(Vec3::new(x, 0.0, 0.0)),
+            visible: true,
+            node: 0,
+        };
+        Scene {
+            name: String::new(),
+            meshes: vec![Arc::new(mesh)],
+            textures: Vec::new(),
+            materials: vec![Arc::new(Material::default())],
+            instances: vec![place(2.0), place(5.0)],
+            lights: Vec::new(),
+            cameras: Vec::new(),
+            environment: Environment::Constant(Vec3::ONE),
+            backdrop: Backdrop::default(),
+            origin_in_file: DVec3::ZERO,
+        }
+    }
+
+    #[test]
+    fn tangents_leave_hierarchies_as_they_are() {
+        let bare = scene(vec![[0, 1, 2], [0, 2, 3]], Vec::new());
+        // As tangents that differ along the seam split its vertices.
+        let with = scene(vec![[0, 1, 2], [0, 5, 3]], vec![Vec4::X; 6]);
+        let mut moved = scene(vec![[0, 1, 2], [0, 2, 3]], Vec::new());
+        moved.instances[0].world_from_mesh.translation.x = 3.0;
+        let loose = std::collections::BTreeSet::from([1]);
+        let mut cache = BlasCache::default();
+        let mut built = |scene: &Scene| {
+            let shapes = Shapes::build(scene, &Split::of(scene, &loose), HierarchyKind::default(), &mut cache);
+            assert_eq!(shapes.vertices.len(), 2 * scene.meshes[0].positions.len());
+            [shapes.static_mesh.as_ref(), shapes.placed.first()].map(|piece| Arc::clone(&piece.unwrap().blas))
+        };
+        let [first, second, third] = [&bare, &with, &moved].map(&mut built);
+        assert!(first.iter().zip(&second).all(|(a, b)| Arc::ptr_eq(a, b)));
+        assert_eq!([0, 1].map(|piece| Arc::ptr_eq(&first[piece], &third[piece])), [false, true]);
+    }
 }

@@ -1,6 +1,6 @@
-//! From the start of a process to its first pictures, without a window: device, import, hierarchies and a sketch of first hits, as
-//! coarse as the window's; then upload, kernels, a first batch, and its reconstruction at 1280x720. Timed from outside, so that
-//! loading the program counts.
+//! From the start of a process to its first pictures, without a window: device, shapes, hierarchies and a sketch of first hits, as
+//! coarse as the window's; then images and tangents, upload, kernels, a first batch, and its reconstruction at 1280x720. Timed from
+//! outside, so that loading the program counts.
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -31,14 +31,21 @@ pub fn show(args: &BenchArgs) -> anyhow::Result<()> {
     };
     let gpu = Gpu::headless(&args.adapter.clone().map_or(AdapterSelect::Auto, AdapterSelect::Named))?;
     let device = since();
-    let subject = Subject::open(args)?;
+    let mut sketched = None;
+    let sketch = |subject: Subject| -> anyhow::Result<()> {
+        let shapes = since();
+        let place = subject.places.first().context("no gaze")?;
+        let mut renderer = subject.empty_renderer(&gpu, args)?;
+        let coarseness = if gpu.is_software() { COARSENESS } else { 1 };
+        Picture::new(&gpu, place, PICTURE_PX.map(|pixels| pixels / coarseness))
+            .sketch(&mut renderer, &subject.scene)?;
+        sketched = Some((renderer, shapes, since(), unix_secs()?));
+        Ok(())
+    };
+    let subject = Subject::open_showing(args, sketch)?;
+    let (mut renderer, shapes, sketch, sketched_at) = sketched.context("no sketch")?;
     let import = since();
     let place = subject.places.first().context("no gaze")?;
-    let mut renderer = subject.empty_renderer(&gpu, args)?;
-    let coarseness = if gpu.is_software() { COARSENESS } else { 1 };
-    Picture::new(&gpu, place, PICTURE_PX.map(|pixels| pixels / coarseness)).sketch(&mut renderer, &subject.scene)?;
-    let sketch = since();
-    let sketched_at = unix_secs()?;
     let report = renderer.set_scene(&subject.scene)?;
     let set = since();
     renderer.trace(FIRST_BATCH)?;
@@ -48,7 +55,7 @@ pub fn show(args: &BenchArgs) -> anyhow::Result<()> {
     let picture = since();
     let compile = report.kernel_compile_secs;
     print_json(&json!({
-        "device_s": device, "import_s": import, "sketch_s": sketch, "sketched_at_unix_s": sketched_at,
+        "device_s": device, "shapes_s": shapes, "sketch_s": sketch, "sketched_at_unix_s": sketched_at, "import_s": import,
         "upload_s": report.upload.bvh_build_secs + report.upload.upload_secs, "kernels_s": compile,
         "rest_of_scene_s": set - report.upload.bvh_build_secs - report.upload.upload_secs - compile,
         "first_batch_s": batch, "picture_s": picture,

@@ -48,9 +48,22 @@ impl Subject {
     /// # Errors
     /// When it cannot be read.
     pub fn open(args: &BenchArgs) -> anyhow::Result<Self> {
+        Self::open_showing(args, |_| Ok(()))
+    }
+
+    /// As [`Subject::open`], and hands on what the scene is before its images are read, which goes on when `show` returns.
+    ///
+    /// # Errors
+    /// When the scene cannot be read, or that of `show`.
+    pub fn open_showing(args: &BenchArgs, show: impl FnOnce(Self) -> anyhow::Result<()>) -> anyhow::Result<Self> {
         let started = Instant::now();
-        let Opened { name, scene, camera } = bench::open(args.scene.as_ref(), args.background)?;
-        let import_secs = started.elapsed().as_secs_f64();
+        let shown = |opened| show(Self::of(args, opened, started.elapsed().as_secs_f64())?);
+        let opened = bench::open_showing(args.scene.as_ref(), args.background, shown)?;
+        Self::of(args, opened, started.elapsed().as_secs_f64())
+    }
+
+    fn of(args: &BenchArgs, opened: Opened, import_secs: f64) -> anyhow::Result<Self> {
+        let Opened { name, scene, camera } = opened;
         let places = gazes(args.gazes).into_iter().map(|gaze| Place::new(gaze, camera.rotation)).collect();
         Ok(Self {
             name,

@@ -154,6 +154,18 @@ pub struct Opened {
 /// # Errors
 /// When it cannot be read or has no such camera.
 pub fn open(scene: Option<&StudyScene>, background: Option<values::Rgb>) -> anyhow::Result<Opened> {
+    open_showing(scene, background, |_| Ok(()))
+}
+
+/// As [`open`], and hands on what the scene is before its images are read, which goes on when `show` returns.
+///
+/// # Errors
+/// As [`open`], or that of `show`.
+pub fn open_showing(
+    scene: Option<&StudyScene>,
+    background: Option<values::Rgb>,
+    show: impl FnOnce(Opened) -> anyhow::Result<()>,
+) -> anyhow::Result<Opened> {
     let name = scene.map_or_else(|| "builtin".into(), scene_name);
     let args = SceneArgs {
         scene: scene.map(|scene| scene.path.clone()),
@@ -166,10 +178,16 @@ pub fn open(scene: Option<&StudyScene>, background: Option<values::Rgb>) -> anyh
         file: FileArgs::default(),
         adapter: None,
     };
-    let loaded = session::load(&Source::from(args.scene.as_deref()), &args)?.scene;
-    let mut viewpoints = session::viewpoints(&loaded);
-    let chosen = session::choose(&viewpoints, args.camera.as_ref())?;
-    Ok(Opened { name, scene: loaded, camera: viewpoints.swap_remove(chosen) })
+    let opened = |scene: Arc<Scene>| -> anyhow::Result<Opened> {
+        let mut viewpoints = session::viewpoints(&scene);
+        let chosen = session::choose(&viewpoints, args.camera.as_ref())?;
+        Ok(Opened { name: name.clone(), scene, camera: viewpoints.swap_remove(chosen) })
+    };
+    let mut shown = Ok(());
+    let source = Source::from(args.scene.as_deref());
+    let loaded = session::load_showing(&source, &args, |shapes| shown = opened(shapes.scene).and_then(show))?;
+    shown?;
+    opened(loaded.scene)
 }
 
 /// How a view of the film is drawn.

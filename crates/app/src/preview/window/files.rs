@@ -202,7 +202,7 @@ impl Window {
                     let view = navigation.standpoint.view;
                     let aspect = view.tan_half.x / view.tan_half.y;
                     let here = (view.film_from_view(), view.vfov());
-                    let (rotation, vfov) = super::looking_at(&file.film.header, here, aspect);
+                    let (rotation, vfov) = super::opening::looking_at(&file.film.header, here, aspect);
                     navigation.jump(file.film.header.pose.position, rotation, vfov);
                     self.files.film = Some(Arc::new(file.film));
                 }
