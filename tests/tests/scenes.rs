@@ -251,11 +251,20 @@ fn punctual_lights() {
         let value = measure(&gpu, &builder.build(), [Vec3::new(-3.0, 2.0, 0.0), target], 1);
         assert_is(what, value, 0.4 / PI * irradiance);
     }
+    // Near a lamp it is far brighter than at a metre: the film holds that.
+    let mut builder = Builder::new(Vec3::ZERO);
+    floor(&mut builder, 0.4);
+    let position = target + Vec3::new(0.0, 0.02, 0.0);
+    let (name, kind, intensity) = (String::new(), PunctualKind::Point, Vec3::splat(5.0));
+    builder.light(PunctualLight { name, kind, intensity, position, rotation });
+    let value = measure(&gpu, &builder.build(), [Vec3::new(-3.0, 2.0, 0.0), target], 1);
+    assert_is("two centimetres below a lamp", value, 0.4 / PI * 5.0 / (0.02 * 0.02));
     // Beside the outer cone there is nothing.
     let mut builder = Builder::new(Vec3::ZERO);
     floor(&mut builder, 0.4);
     let kind = PunctualKind::Spot { inner_angle: 0.2, outer_angle: 0.4 };
-    builder.light(PunctualLight { name: String::new(), kind, intensity: Vec3::splat(5.0), position, rotation });
+    let intensity = Vec3::splat(5.0);
+    builder.light(PunctualLight { name: String::new(), kind, intensity, position: target + to_light, rotation });
     let beside = target + Vec3::new(0.0, 0.0, 4.0);
     assert_eq!(measure(&gpu, &builder.build(), [Vec3::new(-3.0, 2.0, 0.0), beside], 1), (0.0, 0.0));
 }

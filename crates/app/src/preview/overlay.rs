@@ -429,19 +429,20 @@ pub fn keys(ctx: &Context) {
 }
 
 /// Draws a message at the bottom: what is going on, or what went wrong.
-pub fn message(ctx: &Context, text: &str, wrong: bool, busy: bool) {
+pub fn message(ctx: &Context, text: &str, wrong: bool) {
     let area = Area::new(Id::unique("message")).anchor(Align2::CENTER_BOTTOM, egui::vec2(0.0, -14.0));
     area.order(Order::Foreground).interactable(false).show(ctx, |ui| {
         theme::panel().show(ui, |ui| {
-            ui.horizontal(|ui| {
-                if busy {
-                    ui.add(egui::Spinner::new().size(13.0).color(theme::accent(ui)));
-                }
-                let text = RichText::new(text);
-                ui.label(if wrong { text.color(theme::error(ui)) } else { text });
-            });
+            let text = RichText::new(text);
+            ui.label(if wrong { text.color(theme::error(ui)) } else { text });
         });
     });
+}
+
+/// What takes time, and how long it has taken so far. Nothing turns beside it: frames of an animation would take that time on a
+/// CPU adapter.
+pub fn under_way(what: &str, elapsed: Duration) -> String {
+    format!("{what}, {}", clock(elapsed))
 }
 
 /// Draws what is being read, at the bottom; true when it is to be given up.
@@ -451,8 +452,7 @@ pub fn loading(ctx: &Context, name: &str, elapsed: Duration, can_cancel: bool) -
     area.order(Order::Foreground).show(ctx, |ui| {
         theme::panel().show(ui, |ui| {
             ui.horizontal(|ui| {
-                ui.add(egui::Spinner::new().size(13.0).color(theme::accent(ui)));
-                ui.label(format!("loading {name}, {}", clock(elapsed)));
+                ui.label(under_way(&format!("loading {name}"), elapsed));
                 cancelled = can_cancel && ui.button("Cancel").clicked();
             });
         });

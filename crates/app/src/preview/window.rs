@@ -262,18 +262,17 @@ impl Window {
             ctx.request_repaint_after(WORTH_SAYING - elapsed);
         }
         if let Some((busy, since)) = state.busy.as_ref().zip(state.busy_since) {
-            if since.elapsed() >= WORTH_SAYING {
-                overlay::message(ctx, busy, false, true);
-                return;
-            }
             ctx.request_repaint_after(WORTH_SAYING);
+            if since.elapsed() >= WORTH_SAYING {
+                return overlay::message(ctx, &overlay::under_way(busy, since.elapsed()), false);
+            }
         }
         if state.dead {
-            overlay::message(ctx, "the renderer has stopped; the terminal says why", true, false);
+            overlay::message(ctx, "the renderer has stopped; the terminal says why", true);
             return;
         }
         if let Some(note) = self.gaze.note(Instant::now()) {
-            overlay::message(ctx, &note, false, false);
+            overlay::message(ctx, &note, false);
             return;
         }
         let editor = self.editor.as_ref().and_then(Editor::message);
@@ -286,7 +285,7 @@ impl Window {
         } else if self.scene.is_some() {
             return;
         }
-        overlay::message(ctx, text, *wrong, false);
+        overlay::message(ctx, text, *wrong);
     }
 
     fn act(&mut self, action: Action) {

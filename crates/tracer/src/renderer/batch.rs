@@ -28,7 +28,7 @@ pub(super) struct BoundKernels {
 }
 
 impl Renderer {
-    /// Powers of two: 16 times the brightest source is the largest sample that the film holds.
+    /// Powers of two: 16 times the brightest radiance is the largest sample that the film holds.
     pub(super) fn film_scales(&self) -> (f32, f32) {
         let brightest = self.scene.as_ref().map_or(1.0, |s| s.brightest_radiance);
         let exponent = brightest.log2().ceil().clamp(-60.0, 60.0) as i32 + 4;

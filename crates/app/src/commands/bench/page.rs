@@ -337,8 +337,9 @@ fn start(scenes: &Found<'_>) -> String {
         "until the sketch, s",
         "until the end, s",
         "device",
-        "import",
+        "shapes",
         "hierarchies and sketch",
+        "images and tangents",
         "upload of the rest",
         "kernels",
         "light split and film",
@@ -357,8 +358,9 @@ fn start(scenes: &Found<'_>) -> String {
             ];
             for stage in [
                 "device_s",
-                "import_s",
+                "shapes_s",
                 "sketch_s",
+                "import_s",
                 "upload_s",
                 "kernels_s",
                 "rest_of_scene_s",
