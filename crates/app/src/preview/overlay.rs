@@ -433,8 +433,11 @@ pub fn message(ctx: &Context, text: &str, wrong: bool) {
     let area = Area::new(Id::unique("message")).anchor(Align2::CENTER_BOTTOM, egui::vec2(0.0, -14.0));
     area.order(Order::Foreground).interactable(false).show(ctx, |ui| {
         theme::panel().show(ui, |ui| {
-            let text = RichText::new(text);
-            ui.label(if wrong { text.color(theme::error(ui)) } else { text });
+            // As wide as the text: an area wraps it at the width that it had last.
+            ui.horizontal(|ui| {
+                let text = RichText::new(text);
+                ui.label(if wrong { text.color(theme::error(ui)) } else { text });
+            });
         });
     });
 }
