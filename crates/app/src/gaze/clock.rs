@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 /// How long the shortest way of a sample is remembered; clocks drift apart by less than a millisecond in that time.
 const MEMORY: Duration = Duration::from_secs(10);
 /// A device time this far back means that the device has started again.
-const RESTART_SECS: f64 = 1.0;
+pub const RESTART_SECS: f64 = 1.0;
 
 /// When a sample was taken, by our clock.
 ///

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use fovea_app::gaze::feed::MAX_SAMPLES;
-use fovea_app::gaze::parse::trace::Row;
+use fovea_app::gaze::parse::trace::{Row, Trace};
 use fovea_app::gaze::parse::zmtp;
 use fovea_app::gaze::source::{GazeSource, SourceState};
 
@@ -56,6 +56,30 @@ fn with_server(
         client(&mut stream, number, stop);
     });
     (open(&format!("opengaze::{port}")), connections, stop)
+}
+
+#[cfg(unix)]
+#[test]
+fn a_full_disc_leaves_a_recording_of_whole_rows() {
+    let folder = std::env::temp_dir().join(format!("fovea-full-disc-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    let [from, to] = ["from.csv", "to.csv"].map(|name| folder.join(name));
+    let eye = Synthetic::new(120.0, 0.5, 0.1, 3).trace;
+    std::fs::write(&from, eye.write()).unwrap();
+    // To a program that may write no file of more than a block the disc is full within a row.
+    let script = "ulimit -f 1; trap '' XFSZ; exec \"$0\" gaze --source \"trace:$1\" --record \"$2\"";
+    let mut command = std::process::Command::new("sh");
+    let output = command.args(["-c", script, env!("CARGO_BIN_EXE_fovea")]).args([&from, &to]).output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success() && message.contains("to.csv"), "{message}");
+    let text = std::fs::read_to_string(&to).unwrap();
+    assert!(text.ends_with('\n'), "{text}");
+    let rows = Trace::parse(&text).unwrap().rows;
+    // Six digits of the time, which begins anew with the recording.
+    assert!((5..eye.rows.len()).contains(&rows.len()), "{} rows", rows.len());
+    assert!(rows.iter().zip(&eye.rows).all(|(row, sent)| (row.time_secs - sent.time_secs).abs() < 2e-6));
+    std::fs::remove_dir_all(folder).unwrap();
 }
 
 #[test]
