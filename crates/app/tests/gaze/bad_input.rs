@@ -276,6 +276,54 @@ fn unknown_msgpack_types_are_told_and_the_next_message_is_read() {
 }
 
 #[test]
+fn a_surface_that_is_out_of_sight_is_no_lost_connection_and_clocks_are_compared_all_the_while() {
+    let (stop, started, connections) = (Stop::default(), Instant::now(), Arc::new(AtomicU32::new(0)));
+    // Somebody sets Pupil's clock back while nothing comes.
+    let clock = move || started.elapsed().as_secs_f64() + if started.elapsed().as_secs() < 3 { 5000.0 } else { 100.0 };
+    let publisher = serve(&stop, move |mut stream, stop| {
+        write(&mut stream, &[&zmtp::greeting()[..], &zmtp::ready("PUB")].concat());
+        std::thread::sleep(Duration::from_millis(11_500));
+        let row = Row { time_secs: 0.0, point: [0.25, 0.5], valid: true, confidence: 1.0 };
+        let payload = pupil::message("s", &[(clock() - 0.08, row)]);
+        write(&mut stream, &[zmtp::frame(b"surfaces.s", true), zmtp::frame(&payload, false)].concat());
+        linger(&mut stream, stop);
+    });
+    let counted = Arc::clone(&connections);
+    let port = serve(&stop, move |stream, _| {
+        counted.fetch_add(1, Ordering::Relaxed);
+        pupil::remote(stream, publisher, clock);
+    });
+    let mut source = open(&format!("pupil::{port}"));
+    wait_for(source.as_mut(), 3.0, |status| status.state == SourceState::Connected);
+    wait_for(source.as_mut(), 3.0, |status| status.state == SourceState::Stalled);
+    let samples = collect(source.as_mut(), 12.0, |samples| !samples.is_empty());
+    assert_eq!((samples.len(), connections.load(Ordering::Relaxed)), (1, 1), "{:?}", source.status());
+    let age = samples[0].arrived - samples[0].captured;
+    assert!((80..150).contains(&age.as_millis()), "{age:?}");
+    stop.set();
+}
+
+#[test]
+fn a_peer_that_answers_is_tried_again_at_once() {
+    let (stop, connections) = (Stop::default(), Arc::new(AtomicU32::new(0)));
+    let publisher = serve(&stop, |mut stream, _| {
+        write(&mut stream, &[&zmtp::greeting()[..], &zmtp::ready("PUB")].concat());
+        std::thread::sleep(Duration::from_millis(50));
+    });
+    let (counted, started) = (Arc::clone(&connections), Instant::now());
+    let port = serve(&stop, move |stream, _| {
+        counted.fetch_add(1, Ordering::Relaxed);
+        pupil::remote(stream, publisher, || started.elapsed().as_secs_f64());
+    });
+    let _source = open(&format!("pupil::{port}"));
+    std::thread::sleep(Duration::from_secs(4));
+    // 0.3 s each; 0, 0.3, 0.85, 1.9 and 3.95 s after the start if pauses grew.
+    let tries = connections.load(Ordering::Relaxed);
+    assert!((7..=14).contains(&tries), "{tries} connections in 4 s");
+    stop.set();
+}
+
+#[test]
 fn a_peer_that_is_no_zeromq_or_sends_without_end_is_told() {
     let (mut endless, stop) = pupil_source([&[0x02][..], &u64::MAX.to_be_bytes()].concat());
     wait_for(endless.as_mut(), 5.0, lost("longer than"));
