@@ -370,6 +370,9 @@ impl Worker {
             self.pacing.restart();
             self.motion.moves(Instant::now());
         }
+        if self.tracing.begin_trial(look.controls.trial) {
+            self.start_film();
+        }
         if !look.controls.paused && !self.tracing.is_unfinished() {
             let (samples, took) = self.tracing.trace(self.pacing.batch())?;
             self.traced += took;
@@ -483,9 +486,7 @@ impl Worker {
         let result = match request {
             Request::Restart => {
                 self.tracing.restart();
-                self.forget_film();
-                self.pacing.restart();
-                self.rate = Rate::default();
+                self.start_film();
                 Ok(None)
             }
             Request::EnterHeadset => self.enter_headset(),
@@ -550,6 +551,13 @@ impl Worker {
         lock(&self.shared.state).taken_over = film.header.samples();
         lock(&self.shared.survivors).film = Some(film);
         Ok(())
+    }
+
+    /// The film has been emptied.
+    fn start_film(&mut self) {
+        self.forget_film();
+        self.pacing.restart();
+        self.rate = Rate::default();
     }
 
     /// The film is about to start anew.

@@ -167,6 +167,12 @@ impl Worker {
         if self.tracing.follow_head(look, &run.aim())? {
             run.pacing.restart();
         }
+        if self.tracing.begin_trial(look.controls.trial) {
+            // The next one is black.
+            run.panorama = None;
+            self.start_film();
+        }
+        let run = self.headset.as_mut().context("no headset")?;
         let frame = if run.headset.lifecycle().is_running() { Some(run.headset.begin_frame()?) } else { None };
         if let Some(frame) = frame {
             run.draw(frame, look, &mut self.tracing)?;
