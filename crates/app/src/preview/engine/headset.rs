@@ -276,7 +276,7 @@ impl HeadsetRun {
 
     /// What the fovea goes by, in film space.
     fn gaze(&self) -> (Vec3, GazeFrom) {
-        if let Some(direction) = self.eyes.direction() {
+        if let Some(direction) = self.eyes.direction(Instant::now()) {
             return (direction, GazeFrom::Eyes);
         }
         match self.pointer {
