@@ -31,7 +31,7 @@ use super::versions::Versions;
 use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
 use crate::preferences::Store;
-use crate::reload::Loader;
+use crate::reload::{Loader, Watched};
 use crate::session::Source;
 
 mod files;
@@ -69,7 +69,9 @@ pub struct Window {
     /// What is done with it.
     editor: Option<Editor>,
     unsaved: Unsaved,
-    /// The present scene is opened again: what is heard until then is of another.
+    /// The present scene as its files are watched.
+    watched: Option<Watched>,
+    /// The loader goes back to that: what is heard until it does is of another scene.
     going_back: bool,
     /// The version that the engine has been given.
     given: Option<Arc<Scene>>,
@@ -113,6 +115,7 @@ impl Window {
             gaze_direction: None,
             editor: None,
             unsaved: Unsaved::default(),
+            watched: None,
             going_back: false,
             given: None,
             camera: 0,
