@@ -328,16 +328,18 @@ impl Worker {
                 self.sketch_shapes(&look);
                 continue;
             }
-            if self.failed.as_ref() == Some(&look) {
-                continue;
-            }
-            self.failed = None;
+            // Whatever became of the window's picture: a headset has its own.
             if self.headset.is_some() {
+                self.failed = None;
                 if let Err(error) = self.headset_frame(&look) {
                     self.tell(one_line(&error), true);
                 }
                 continue;
             }
+            if self.failed.as_ref() == Some(&look) {
+                continue;
+            }
+            self.failed = None;
             let done = self.frame(&look).and_then(|()| self.keep());
             if let Err(error) = done
                 && !self.tracing.is_lost()
