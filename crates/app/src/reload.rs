@@ -40,8 +40,29 @@ pub enum LoadEvent {
     NotOpened(String),
     /// The files of the open scene cannot be read as they are now: one line. The last version stays.
     Broken(String),
+    /// The scene that was to be followed again is: what comes from now on is of it.
+    Followed,
     /// An environment image that was asked for, or why it cannot be had.
     Environment(PathBuf, Result<Arc<EnvironmentImage>, String>),
+}
+
+/// What is watched of a scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Watched {
+    /// The scene.
+    pub source: Source,
+    /// Its files and companions.
+    pub files: Vec<PathBuf>,
+    /// Images that did not decode in the version that is shown.
+    pub replaced_images: Vec<String>,
+}
+
+impl Watched {
+    /// Of a scene that was loaded.
+    pub fn new(source: &Source, loaded: &Loaded) -> Self {
+        let (files, replaced_images) = (loaded.files.clone(), loaded.replaced_images.clone());
+        Self { source: source.clone(), files, replaced_images }
+    }
 }
 
 /// Shapes of a scene whose images are not read yet.
@@ -67,6 +88,7 @@ type Wake = Arc<dyn Fn() + Send + Sync>;
 
 enum Note {
     Open(Source),
+    Follow(Watched),
     Cancel,
     /// Something happened in a watched folder.
     Stirred,
@@ -141,6 +163,11 @@ impl Loader {
         self.send(Note::Open(source));
     }
 
+    /// Goes back to following a scene that was opened before; it is read again, as its files may have changed meanwhile.
+    pub fn follow(&self, watched: Watched) {
+        self.send(Note::Follow(watched));
+    }
+
     /// Gives up what is being opened.
     pub fn cancel(&self) {
         self.send(Note::Cancel);
@@ -193,11 +220,8 @@ impl Drop for Loader {
 
 /// The scene whose files are watched.
 struct Open {
-    source: Source,
-    files: Vec<PathBuf>,
+    watched: Watched,
     rule: Rule,
-    /// Images that did not decode in the version that is shown.
-    replaced: Vec<String>,
     /// The files cannot be read: what lies beside them counts too.
     broken: bool,
     /// Read, but with images that do not decode: taken if nothing changes until then.
@@ -205,8 +229,15 @@ struct Open {
 }
 
 impl Open {
+    /// With files that are read again once they rest.
+    fn new(watched: Watched, timing: Timing) -> Self {
+        let rule = Rule::after(Stamps::default(), timing, Instant::now());
+        Self { watched, rule, broken: false, doubtful: None }
+    }
+
     fn stamps(&self) -> Stamps {
-        if self.broken { Stamps::with_neighbours(&self.files) } else { Stamps::of(&self.files) }
+        let files = &self.watched.files;
+        if self.broken { Stamps::with_neighbours(files) } else { Stamps::of(files) }
     }
 
     /// Files have been named that were not looked at before the reading: if one was written since it began, or just
@@ -250,6 +281,7 @@ impl Worker {
         loop {
             match self.inbox.recv_timeout(pause) {
                 Ok(Note::Open(source)) => self.begin(source),
+                Ok(Note::Follow(watched)) => self.follow(watched),
                 Ok(Note::Cancel) => self.cancel(),
                 Ok(Note::Shapes(number, source, sketchable)) => {
                     if number == self.number && matches!(self.reading, Some(ReadingOf::Wish)) {
@@ -299,7 +331,7 @@ impl Worker {
 
     fn read_again(&mut self) {
         if let Some(open) = &self.open {
-            let source = open.source.clone();
+            let source = open.watched.source.clone();
             self.reading = Some(ReadingOf::Again);
             self.read(source);
         }
@@ -329,12 +361,26 @@ impl Worker {
         }
     }
 
+    fn follow(&mut self, watched: Watched) {
+        // What is being read again is of another scene.
+        if matches!(self.reading, Some(ReadingOf::Again)) {
+            self.give_up();
+        }
+        self.open = Some(Open::new(watched, self.timing));
+        self.watch();
+        self.tell(LoadEvent::Followed);
+    }
+
     fn cancel(&mut self) {
         if matches!(self.reading, Some(ReadingOf::Wish)) {
-            self.number += 1;
-            self.reading = None;
-            self.say(None);
+            self.give_up();
         }
+    }
+
+    fn give_up(&mut self) {
+        self.number += 1;
+        self.reading = None;
+        self.say(None);
     }
 
     fn finish(&mut self, finished: Finished) {
@@ -354,14 +400,7 @@ impl Worker {
     fn finish_wish(&mut self, Finished { source, began, result, .. }: Finished) {
         match result {
             Ok(loaded) => {
-                let mut open = Open {
-                    source: source.clone(),
-                    files: loaded.files.clone(),
-                    rule: Rule::after(Stamps::default(), self.timing, Instant::now()),
-                    replaced: loaded.replaced_images.clone(),
-                    broken: false,
-                    doubtful: None,
-                };
+                let mut open = Open::new(Watched::new(&source, &loaded), self.timing);
                 open.watch_anew(began, self.timing);
                 self.open = Some(open);
                 self.watch();
@@ -379,12 +418,13 @@ impl Worker {
         }
         match result {
             Ok(loaded) => {
-                if open.broken || open.files != loaded.files {
+                if open.broken || open.watched.files != loaded.files {
                     open.broken = false;
-                    open.files.clone_from(&loaded.files);
+                    open.watched.files.clone_from(&loaded.files);
                     open.watch_anew(began, self.timing);
                 }
-                match loaded.replaced_images.iter().find(|image| !open.replaced.contains(image)).cloned() {
+                let known = &open.watched.replaced_images;
+                match loaded.replaced_images.iter().find(|image| !known.contains(image)).cloned() {
                     None => self.show_again(loaded),
                     Some(text) => {
                         open.doubtful = Some((loaded, now + self.timing.grace));
@@ -406,7 +446,7 @@ impl Worker {
 
     fn show_again(&mut self, loaded: Loaded) {
         if let Some(open) = &mut self.open {
-            open.replaced.clone_from(&loaded.replaced_images);
+            open.watched.replaced_images.clone_from(&loaded.replaced_images);
         }
         self.tell(LoadEvent::Changed(loaded));
     }
@@ -414,7 +454,7 @@ impl Worker {
     /// Watches the folders of the open scene's files: a file that is replaced by renaming is seen in its folder.
     fn watch(&mut self) {
         let Some(open) = &self.open else { return };
-        let wanted = folders(&open.files);
+        let wanted = folders(&open.watched.files);
         let Some(watcher) = &mut self.watcher else { return };
         for folder in self.watched.iter().filter(|folder| !wanted.contains(folder)) {
             // A folder that is gone cannot be unwatched, and need not be.

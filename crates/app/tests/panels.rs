@@ -24,7 +24,7 @@ use fovea_app::preview::editor::panel::{self, Action, PanelState, Tab};
 use fovea_app::preview::gaze_control::GazeControl;
 use fovea_app::preview::overlay::{self, Facts, Visibility};
 use fovea_app::preview::seeing::{self, Seen};
-use fovea_app::preview::split_panel::{self, SplitTimes};
+use fovea_app::preview::split_panel::SplitTimes;
 use fovea_app::preview::{file_menu, gaze_panel, legend, theme};
 use fovea_app::recent::RecentFiles;
 use fovea_app::session::{self, Source};
@@ -33,6 +33,8 @@ use tracer::view::{DebugScale, DebugView, Histogram};
 
 #[path = "panels/properties.rs"]
 mod properties;
+#[path = "panels/split.rs"]
+mod split;
 
 fn args() -> PreviewArgs {
     Cli::parse_from(["fovea"]).preview
@@ -511,63 +513,4 @@ fn notes_say_what_they_are_told() {
     harness.get_by_label("Cancel").click();
     harness.run_steps(2);
     assert!(*harness.state());
-}
-
-#[test]
-fn a_run_of_split_times_goes_through_its_modes_and_writes_its_results() {
-    let folder = std::env::temp_dir().join(format!("fovea-split-{}", std::process::id()));
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir_all(&folder).unwrap();
-    let place = folder.clone();
-    let mut split = SplitTimes::default();
-    split.plan.repetitions = 1;
-    let modes = split.plan.modes.len();
-    let first = split.start(5, Instant::now());
-    assert!(matches!(first, Some(split_panel::Action::Show(_))) && split.hides_mode());
-    let mut note = String::new();
-    let draw = move |ui: &mut egui::Ui, (split, told): &mut (SplitTimes, Vec<split_panel::Action>)| {
-        let scene = split_panel::Scene { name: "room.glb", adapter: "an adapter", folder: &place };
-        told.extend(split.written(ui.ctx()));
-        told.extend(split.keys(ui.ctx(), Instant::now(), (1000, [0.0, 0.0]), &scene));
-        split.banner(ui.ctx());
-        let label = ui.label("Note");
-        ui.text_edit_singleline(&mut note).labelled_by(label.id);
-    };
-    // A plot that somebody kept of an earlier run.
-    std::fs::write(folder.join("split-times-1.svg"), "kept").unwrap();
-    let mut harness = harness(draw, (split, Vec::new()));
-    // Letters of a text are no answers.
-    harness.get_by_role_and_label(Role::TextInput, "Note").click();
-    harness.run_steps(2);
-    for key in [egui::Key::O, egui::Key::P] {
-        harness.key_press(key);
-        harness.run_steps(2);
-    }
-    assert!(harness.query_by_label("O: the outline is visible").is_some() && harness.state().1.is_empty());
-    harness.ctx.memory_mut(egui::Memory::stop_text_input);
-    harness.run_steps(2);
-    for _ in 0..modes {
-        assert!(harness.query_by_label("O: the outline is visible").is_some());
-        // Too early for the material.
-        for key in [egui::Key::P, egui::Key::O] {
-            harness.key_press(key);
-            harness.run_steps(2);
-        }
-        assert!(harness.query_by_label("P: the material is visible").is_some());
-        harness.key_press(egui::Key::P);
-        harness.run_steps(2);
-    }
-    let end = Instant::now() + Duration::from_secs(20);
-    while harness.state().1.len() < modes && Instant::now() < end {
-        std::thread::sleep(Duration::from_millis(5));
-        harness.run_steps(1);
-    }
-    let (split, told) = harness.state();
-    assert_eq!(told.len(), modes);
-    assert!(matches!(told.last(), Some(split_panel::Action::Tell(_, false))) && !split.hides_mode(), "{told:?}");
-    let csv = std::fs::read_to_string(folder.join("split-times-2.csv")).unwrap();
-    assert_eq!(csv.lines().filter(|line| line.contains(",room.glb,")).count(), modes);
-    assert!(folder.join("split-times-2.svg").exists());
-    assert_eq!(std::fs::read_to_string(folder.join("split-times-1.svg")).unwrap(), "kept");
-    std::fs::remove_dir_all(folder).unwrap();
 }

@@ -9,7 +9,7 @@ use clap::Parser;
 use fovea_app::cli::Cli;
 use fovea_app::cli::values::CameraChoice;
 use fovea_app::reload::rule::Timing;
-use fovea_app::reload::{LoadEvent, Loader};
+use fovea_app::reload::{LoadEvent, Loader, Watched};
 use fovea_app::session::{Loaded, Source};
 
 /// A pause that ends a version; within a version the writer never means to rest so long.
@@ -223,6 +223,42 @@ fn a_broken_file_says_so_and_a_mended_one_is_shown() {
     std::fs::write(&path, glb(5)).unwrap();
     let event = wait(&loader, |_| {}, |event| matches!(event, LoadEvent::Changed(_)));
     assert_eq!(version(loaded(&event)), 5);
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn a_scene_that_stays_is_followed_again_after_another_was_read() {
+    let folder = scratch("back");
+    let [here, there] = ["here.glb", "there.glb"].map(|name| folder.join(name));
+    std::fs::write(&here, glb(1)).unwrap();
+    std::fs::write(&there, glb(2)).unwrap();
+    let loader = loader();
+    let opened = |path: &Path| {
+        loader.open(Source::File(path.to_owned()));
+        wait(&loader, |_| {}, |event| matches!(event, LoadEvent::Opened(..)))
+    };
+    let watched = Watched::new(&Source::File(here.clone()), loaded(&opened(&here)));
+    opened(&there);
+    // While somebody is asked whether the first may go, its file breaks; the answer is that it stays.
+    std::fs::write(&here, b"half a scene").unwrap();
+    loader.follow(watched);
+    wait(&loader, |_| {}, |event| matches!(event, LoadEvent::Followed));
+    let next = || {
+        wait(
+            &loader,
+            |event| assert!(matches!(event, LoadEvent::Broken(_)), "{event:?}"),
+            |event| matches!(event, LoadEvent::Changed(_)),
+        )
+    };
+    wait(&loader, |_| {}, |event| matches!(event, LoadEvent::Broken(text) if text.contains("here.glb")));
+    std::fs::write(&there, glb(3)).unwrap();
+    std::fs::write(&here, glb(4)).unwrap();
+    assert_eq!(version(loaded(&next())), 4, "of the other nothing is heard");
+    // A wish that fails changes nothing of that.
+    loader.open(Source::File(folder.join("nowhere.glb")));
+    wait(&loader, |_| {}, |event| matches!(event, LoadEvent::NotOpened(_)));
+    std::fs::write(&here, glb(5)).unwrap();
+    wait(&loader, |_| {}, |event| matches!(event, LoadEvent::Changed(scene) if version(scene) == 5));
     std::fs::remove_dir_all(folder).unwrap();
 }
 

@@ -118,6 +118,32 @@ fn two_modes_get_the_same_time_and_each_its_side() {
 }
 
 #[test]
+fn a_trial_of_split_times_begins_without_a_picture_and_is_not_denoised() {
+    let (mut tracing, mut look) = open();
+    look.controls.denoise = true;
+    tracing.follow(&look).unwrap();
+    tracing.trace(1 << 14).unwrap();
+    while tracing.is_guided(&look) == Some(false) {
+        tracing.find_guides(&look).unwrap();
+    }
+    let lit = |texels: &[[u8; 4]]| texels.iter().filter(|texel| texel[..3] != [0; 3]).count();
+    assert!(lit(&shown(&mut tracing, &look)) > 10_000);
+    for trial in [4, 5] {
+        look.controls.trial = Some(trial);
+        tracing.follow(&look).unwrap();
+        assert!(tracing.begin_trial(look.controls.trial) && !tracing.begin_trial(look.controls.trial));
+        assert_eq!((tracing.samples(), tracing.elapsed()), (0, Duration::ZERO));
+        assert_eq!((lit(&shown(&mut tracing, &look)), tracing.is_guided(&look)), (0, None), "trial {trial}");
+        tracing.trace(1 << 12).unwrap();
+        assert!(shown(&mut tracing, &look) == whole(tracing.renderer().unwrap(), &look), "its samples and no guides");
+    }
+    // What was seen last stays when the run is over.
+    look.controls.trial = None;
+    tracing.follow(&look).unwrap();
+    assert!(!tracing.begin_trial(None) && tracing.samples() > 0 && tracing.is_guided(&look).is_some());
+}
+
+#[test]
 fn both_films_follow_the_viewer_and_the_scene() {
     let (mut tracing, mut look) = open();
     look.controls.comparison = Some(Comparison { mode: Mode::Fv, wipe: 0.5 });

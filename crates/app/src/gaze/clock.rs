@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 /// How long the shortest way of a sample is remembered; clocks drift apart by less than a millisecond in that time.
 const MEMORY: Duration = Duration::from_secs(10);
 /// A device time this far back means that the device has started again.
-const RESTART_SECS: f64 = 1.0;
+pub const RESTART_SECS: f64 = 1.0;
 
 /// When a sample was taken, by our clock.
 ///
@@ -51,7 +51,8 @@ impl DeviceClock {
             return None;
         }
         match self.last_secs {
-            Some(last) if device_secs <= last - RESTART_SECS => self.smallest = None,
+            // What was measured was of the clock before.
+            Some(last) if device_secs <= last - RESTART_SECS => (self.smallest, self.measured) = (None, None),
             Some(last) if device_secs <= last => return None,
             _ => {}
         }
@@ -106,6 +107,20 @@ mod tests {
         // An offset that is wrong by more than the age cannot put a sample into the future.
         clock.set_offset(-99.0);
         assert_eq!(clock.captured(100.6, arrived), Some(arrived));
+    }
+
+    #[test]
+    fn an_offset_that_was_measured_before_a_restart_does_not_count_after_it() {
+        let epoch = Instant::now();
+        let mut clock = DeviceClock::new(epoch);
+        clock.set_offset(-100.0);
+        assert!(clock.captured(100.5, epoch + ms(540)).is_some());
+        let arrived = epoch + ms(1000);
+        assert_eq!(clock.captured(0.5, arrived), Some(arrived), "taken for the fastest, not for 100.5 s old");
+        assert!(!clock.is_synchronised());
+        clock.set_offset(0.48);
+        let age = (epoch + ms(1020)).duration_since(clock.captured(0.51, epoch + ms(1020)).unwrap());
+        assert!(age.abs_diff(ms(30)) < Duration::from_micros(2), "{age:?}");
     }
 
     #[test]

@@ -53,6 +53,8 @@ struct Shared {
     status: Mutex<SourceStatus>,
     unwanted: AtomicBool,
     calibrate: AtomicBool,
+    /// The session's handshake is over.
+    connected: AtomicBool,
 }
 
 /// Plain data, valid whether or not another holder panicked.
@@ -74,6 +76,12 @@ impl Outlet {
     /// Changes what the source says about itself.
     pub fn update(&self, change: impl FnOnce(&mut SourceStatus)) {
         change(&mut lock(&self.shared.status));
+    }
+
+    /// Says that the device is there and speaks as it should, whether or not it has samples to send.
+    pub fn connected(&self) {
+        self.shared.connected.store(true, Ordering::Relaxed);
+        self.update(|status| status.state = SourceState::Connected);
     }
 
     /// Whether a calibration has been asked for since the last call.
@@ -199,14 +207,14 @@ impl FeedSource {
     }
 }
 
-/// Session after session, with longer and longer pauses while none delivers anything.
+/// Session after session, with longer and longer pauses while none comes about.
 fn keep_up(link: &mut impl Link, outlet: &Outlet) {
     let mut back_off = FIRST_BACK_OFF;
     while !outlet.unwanted() {
         let before = lock(&outlet.shared.status).received;
         let ended = link.session(outlet);
         let delivered = lock(&outlet.shared.status).received > before;
-        if delivered {
+        if outlet.shared.connected.swap(false, Ordering::Relaxed) || delivered {
             back_off = FIRST_BACK_OFF;
         }
         let state = match ended {

@@ -9,7 +9,7 @@ use super::feed::{Ended, FeedSource, Link, Outlet};
 use super::parse::excerpt;
 use super::parse::opengaze::{CalibrationSummary, Splitter, Tag};
 use super::sample::Point;
-use super::source::{Calibration, SourceState, TrackedScreen};
+use super::source::{Calibration, TrackedScreen};
 
 /// Where Gazepoint Control listens.
 pub const DEFAULT_PORT: u16 = 4242;
@@ -91,7 +91,7 @@ impl Session {
                     outlet.update(|status| status.screen = Some(screen));
                 }
             }
-            ("ACK", Some("ENABLE_SEND_DATA")) => outlet.update(|status| status.state = SourceState::Connected),
+            ("ACK", Some("ENABLE_SEND_DATA")) => outlet.connected(),
             ("NACK", Some(id)) if ENABLED.contains(&id) => {
                 return Err(Ended::Failed(format!("the tracker refuses {id}")));
             }

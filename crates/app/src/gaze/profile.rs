@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use super::drift::DriftCorrection;
 use super::parse::edid::{self, MonitorSize};
@@ -64,25 +64,25 @@ pub struct Profiles {
 }
 
 impl Profiles {
-    /// From the user's settings. A file that cannot be read counts as empty and is named in the note.
+    /// From the user's settings. A file that cannot be read is put aside and named in the note.
     pub fn load() -> (Self, Option<String>) {
         config::folder().map_or((Self::default(), None), |folder| Self::load_from(&folder.join("gaze.json")))
     }
 
     /// From a file.
     pub fn load_from(path: &Path) -> (Self, Option<String>) {
-        let mut profiles = Self { path: Some(path.to_owned()), entries: BTreeMap::new() };
-        let note = match config::read(path) {
-            Ok(Value::Object(entries)) => {
-                profiles.entries =
-                    entries.iter().map(|(key, value)| (key.clone(), Profile::from_json(value))).collect();
-                None
+        let (entries, note) = match read(path) {
+            Ok(entries) => (entries, None),
+            Err(reason) => {
+                let aside = match config::put_aside(path) {
+                    Ok(aside) => format!("it is kept as {}", aside.display()),
+                    Err(error) => format!("it cannot be put aside: {error}"),
+                };
+                (Map::new(), Some(format!("{reason}; {aside}, and settings of gaze start afresh")))
             }
-            Ok(Value::Null) => None,
-            Ok(_) => Some(format!("{}: no list of profiles; settings of gaze start afresh", path.display())),
-            Err(reason) => Some(format!("{reason}; settings of gaze start afresh")),
         };
-        (profiles, note)
+        let entries = entries.iter().map(|(key, value)| (key.clone(), Profile::from_json(value))).collect();
+        (Self { path: Some(path.to_owned()), entries }, note)
     }
 
     /// What is remembered of a person before a screen.
@@ -90,16 +90,26 @@ impl Profiles {
         self.entries.get(&key(person, monitor)).copied().unwrap_or_default()
     }
 
-    /// Remembers a person before a screen, and writes the file.
+    /// Remembers a person before a screen, and puts that into the file; what another window or version has put there stays.
     ///
     /// # Errors
-    /// When the file cannot be written.
+    /// When the file cannot be read or written.
     pub fn set(&mut self, person: &str, monitor: &str, profile: Profile) -> anyhow::Result<()> {
-        self.entries.insert(key(person, monitor), profile);
+        let key = key(person, monitor);
+        self.entries.insert(key.clone(), profile);
         let Some(path) = &self.path else { return Ok(()) };
-        let entries: BTreeMap<&String, Value> =
-            self.entries.iter().map(|(key, profile)| (key, profile.to_json())).collect();
-        config::write(path, &json!(entries))
+        let mut entries = read(path).map_err(anyhow::Error::msg)?;
+        entries.insert(key, profile.to_json());
+        config::write(path, &Value::Object(entries))
+    }
+}
+
+/// The file's entries; none when there is no file.
+fn read(path: &Path) -> Result<Map<String, Value>, String> {
+    match config::read(path)? {
+        Value::Object(entries) => Ok(entries),
+        Value::Null => Ok(Map::new()),
+        _ => Err(format!("{}: no list of profiles", path.display())),
     }
 }
 
@@ -157,10 +167,34 @@ mod tests {
         let (partly, _) = Profiles::load_from(&path);
         let kept = Profile { drift: DriftCorrection { offset_deg: [0.0, 1.0] }, ..Profile::default() };
         assert_eq!(partly.get("a", "left"), kept);
-        std::fs::write(&path, "{").unwrap();
-        let (empty, note) = Profiles::load_from(&path);
-        assert_eq!(empty.get("a", "left"), Profile::default());
-        assert!(note.unwrap().contains("gaze.json"));
+        for (broken, aside) in [("{", "gaze.broken.json"), ("[1]", "gaze.broken-2.json")] {
+            std::fs::write(&path, broken).unwrap();
+            let (mut empty, note) = Profiles::load_from(&path);
+            assert_eq!(empty.get("a", "left"), Profile::default());
+            assert!(note.unwrap().contains(aside));
+            empty.set("a", "left", profile).unwrap();
+            assert_eq!(std::fs::read_to_string(folder.join(aside)).unwrap(), broken, "somebody may mend it");
+            assert_eq!(Profiles::load_from(&path).0.get("a", "left"), profile);
+        }
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn what_others_keep_in_the_file_stays() {
+        let folder = std::env::temp_dir().join(format!("fovea-profiles-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&folder);
+        let path = folder.join("gaze.json");
+        let (mut one, mut two) = (Profiles::load_from(&path).0, Profiles::load_from(&path).0);
+        let accurate = |deg| Profile { accuracy_deg: Some(deg), ..Profile::default() };
+        one.set("a", "left", accurate(0.5)).unwrap();
+        two.set("b", "left", accurate(0.75)).unwrap();
+        one.set("a", "left", accurate(0.25)).unwrap();
+        let (both, _) = Profiles::load_from(&path);
+        assert_eq!([both.get("a", "left"), both.get("b", "left")], [accurate(0.25), accurate(0.75)]);
+        // As another program is writing it, or a newer version of this one has.
+        std::fs::write(&path, "{ half").unwrap();
+        assert!(two.set("b", "left", accurate(1.0)).is_err());
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "{ half");
         std::fs::remove_dir_all(&folder).unwrap();
     }
 

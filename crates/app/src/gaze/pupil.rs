@@ -14,7 +14,6 @@ use super::parse::excerpt;
 use super::parse::pupil::SurfaceMessage;
 use super::parse::zmtp::{self, Peer};
 use super::sample::Point;
-use super::source::SourceState;
 
 /// Where Pupil Remote listens.
 pub const DEFAULT_PORT: u16 = 50_020;
@@ -24,6 +23,9 @@ const LEAST_CONFIDENCE: f64 = 0.6;
 const ANSWER: Duration = Duration::from_secs(2);
 /// Questions for the time, of which the fastest answer counts.
 const CLOCK_PROBES: u32 = 5;
+/// How often the time is asked for: Pupil's clock can be set while it runs, and its answer says that it is there while no surface
+/// is in sight.
+const CLOCK_INTERVAL: Duration = Duration::from_secs(5);
 
 /// Starts a source for one surface, or for all.
 pub fn source(host: &str, port: u16, surface: Option<&str>) -> FeedSource {
@@ -81,6 +83,7 @@ impl Socket {
         let request = [zmtp::frame(b"", true), zmtp::frame(question.as_bytes(), false)].concat();
         self.stream.write_all(&request)?;
         let asked = Instant::now();
+        self.heard = asked;
         loop {
             if let Some(message) = self.ready.pop_front() {
                 let text = message.last().map(|frame| String::from_utf8_lossy(frame).into_owned());
@@ -112,18 +115,16 @@ impl PupilCore {
             .trim()
             .parse()
             .map_err(|_| Ended::Lost(format!("Pupil Remote names the port `{}`", excerpt(&answer))))?;
-        if let Some(offset) = clock_offset(&mut remote, outlet, &clock)? {
-            clock.set_offset(offset);
-        }
+        compare_clocks(&mut remote, outlet, &mut clock)?;
+        let mut compared = Instant::now();
         let topic = format!("surfaces.{}", self.surface.as_deref().unwrap_or_default());
         let mut publisher = Socket::open(outlet, &self.host, port, "SUB")?;
         // A subscription is a message of a 1 and the topic's beginning.
         publisher.stream.write_all(&zmtp::frame(&[&[1], topic.as_bytes()].concat(), false))?;
-        outlet.update(|status| {
-            status.detail = format!("{}:{port}, {topic}", self.host);
-            status.state = SourceState::Connected;
-        });
+        outlet.update(|status| status.detail = format!("{}:{port}, {topic}", self.host));
+        outlet.connected();
         loop {
+            let was_synchronised = clock.is_synchronised();
             publisher.read(outlet)?;
             while let Some(message) = publisher.ready.pop_front() {
                 let Some(payload) = message.get(1) else { continue };
@@ -134,6 +135,12 @@ impl PupilCore {
                         status.detail = format!("unreadable message: {error}");
                     }),
                 }
+            }
+            if compared.elapsed() >= CLOCK_INTERVAL || was_synchronised && !clock.is_synchronised() {
+                compare_clocks(&mut remote, outlet, &mut clock)?;
+                compared = Instant::now();
+                // A publisher without anything to say is not gone.
+                publisher.heard = compared.max(publisher.heard);
             }
         }
     }
@@ -153,17 +160,18 @@ fn hand_over(surface: &SurfaceMessage, wanted: Option<&str>, clock: &mut DeviceC
     }
 }
 
-/// Our clock minus Pupil's, seconds, from the fastest of a few answers; `None` when it does not tell its time.
-fn clock_offset(remote: &mut Socket, outlet: &Outlet, clock: &DeviceClock) -> Result<Option<f64>, Ended> {
+/// Measures our clock minus Pupil's by the fastest of a few answers; one that does not tell its time is left to be estimated.
+fn compare_clocks(remote: &mut Socket, outlet: &Outlet, clock: &mut DeviceClock) -> Result<(), Ended> {
     let mut best: Option<(f64, f64)> = None;
     for _ in 0..CLOCK_PROBES {
         let asked = clock.local_secs(Instant::now());
         let answer = remote.ask(outlet, "t")?;
         let round_trip = clock.local_secs(Instant::now()) - asked;
-        let Some(time) = super::parse::finite(&answer) else { return Ok(None) };
+        let Some(time) = super::parse::finite(&answer) else { return Ok(()) };
         if best.is_none_or(|(fastest, _)| round_trip < fastest) {
             best = Some((round_trip, asked + round_trip * 0.5 - time));
         }
     }
-    Ok(best.map(|(_, offset)| offset))
+    best.into_iter().for_each(|(_, offset)| clock.set_offset(offset));
+    Ok(())
 }

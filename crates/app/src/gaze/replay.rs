@@ -32,7 +32,10 @@ impl Replay {
     pub fn open(path: &Path, repeats: bool) -> anyhow::Result<Self> {
         let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
         let trace = Trace::parse(&text).with_context(|| path.display().to_string())?;
-        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        let mut name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        if trace.is_cut_off {
+            name += ", whose last row is cut off";
+        }
         Ok(Self::new(name, trace, repeats))
     }
 

@@ -1,5 +1,6 @@
 //! What a person types to name a source: `opengaze`, `lsl:name=GP3`, `trace:file.csv,loop`.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -62,10 +63,10 @@ impl fmt::Display for SourceSpec {
         match self {
             Self::Mouse => f.write_str("mouse"),
             Self::MouseDwell => f.write_str("mouse-dwell"),
-            Self::OpenGaze(host, port) => write!(f, "opengaze:{host}:{port}"),
+            Self::OpenGaze(host, port) => write!(f, "opengaze:{}:{port}", bracketed(host)),
             Self::Lsl(spec) => write!(f, "lsl{spec}"),
-            Self::Pupil(host, port, None) => write!(f, "pupil:{host}:{port}"),
-            Self::Pupil(host, port, Some(surface)) => write!(f, "pupil:{host}:{port}/{surface}"),
+            Self::Pupil(host, port, None) => write!(f, "pupil:{}:{port}", bracketed(host)),
+            Self::Pupil(host, port, Some(surface)) => write!(f, "pupil:{}:{port}/{surface}", bracketed(host)),
             Self::Trace(path, repeats) => write!(f, "trace:{}{}", path.display(), if *repeats { ",loop" } else { "" }),
         }
     }
@@ -102,10 +103,16 @@ impl FromStr for SourceSpec {
     }
 }
 
+/// A host as it stands before a port.
+fn bracketed(host: &str) -> Cow<'_, str> {
+    if host.contains(':') { format!("[{host}]").into() } else { host.into() }
+}
+
 fn host_port(text: &str, default_port: u16) -> Result<(String, u16), String> {
     let (host, port) = match text.rsplit_once(':') {
-        Some((host, port)) => (host, port.parse().map_err(|_| format!("`{port}` is no port"))?),
-        None => (text, default_port),
+        // The colons of an address in brackets are its own.
+        Some((host, port)) if !port.ends_with(']') => (host, port.parse().map_err(|_| format!("`{port}` is no port"))?),
+        _ => (text, default_port),
     };
     let host = if host.is_empty() { "127.0.0.1" } else { host };
     Ok((host.trim_matches(['[', ']']).to_owned(), port))
@@ -250,6 +257,11 @@ mod tests {
         assert_eq!(spec("opengaze"), SourceSpec::OpenGaze("127.0.0.1".into(), 4242));
         assert_eq!(spec("opengaze::4243"), SourceSpec::OpenGaze("127.0.0.1".into(), 4243));
         assert_eq!(spec("opengaze:[::1]:4243"), SourceSpec::OpenGaze("::1".into(), 4243));
+        assert_eq!(spec("opengaze:[fe80::1]"), SourceSpec::OpenGaze("fe80::1".into(), 4242));
+        assert_eq!(spec("pupil:[::1]/wall"), SourceSpec::Pupil("::1".into(), 50_020, Some("wall".into())));
+        for text in ["opengaze:[::1]", "pupil:[::1]/wall"] {
+            assert_eq!(spec(&spec(text).to_string()), spec(text));
+        }
         assert_eq!(spec("pupil:/wall"), SourceSpec::Pupil("127.0.0.1".into(), 50_020, Some("wall".into())));
     }
 

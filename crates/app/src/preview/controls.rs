@@ -47,6 +47,8 @@ pub struct Controls {
     pub comparison: Option<Comparison>,
     /// No tracing while true.
     pub paused: bool,
+    /// The trial of split times that is shown: its picture starts empty and is of its samples alone.
+    pub trial: Option<u64>,
     /// Where else samples are wanted.
     pub attention: Attention,
 }
@@ -73,6 +75,7 @@ impl From<&PreviewArgs> for Controls {
             histogram: false,
             comparison: None,
             paused: false,
+            trial: None,
             attention: Attention::default(),
         }
     }

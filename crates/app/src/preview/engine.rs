@@ -328,16 +328,18 @@ impl Worker {
                 self.sketch_shapes(&look);
                 continue;
             }
-            if self.failed.as_ref() == Some(&look) {
-                continue;
-            }
-            self.failed = None;
+            // Whatever became of the window's picture: a headset has its own.
             if self.headset.is_some() {
+                self.failed = None;
                 if let Err(error) = self.headset_frame(&look) {
                     self.tell(one_line(&error), true);
                 }
                 continue;
             }
+            if self.failed.as_ref() == Some(&look) {
+                continue;
+            }
+            self.failed = None;
             let done = self.frame(&look).and_then(|()| self.keep());
             if let Err(error) = done
                 && !self.tracing.is_lost()
@@ -369,6 +371,9 @@ impl Worker {
         if changed? {
             self.pacing.restart();
             self.motion.moves(Instant::now());
+        }
+        if self.tracing.begin_trial(look.controls.trial) {
+            self.start_film();
         }
         if !look.controls.paused && !self.tracing.is_unfinished() {
             let (samples, took) = self.tracing.trace(self.pacing.batch())?;
@@ -483,9 +488,7 @@ impl Worker {
         let result = match request {
             Request::Restart => {
                 self.tracing.restart();
-                self.forget_film();
-                self.pacing.restart();
-                self.rate = Rate::default();
+                self.start_film();
                 Ok(None)
             }
             Request::EnterHeadset => self.enter_headset(),
@@ -550,6 +553,13 @@ impl Worker {
         lock(&self.shared.state).taken_over = film.header.samples();
         lock(&self.shared.survivors).film = Some(film);
         Ok(())
+    }
+
+    /// The film has been emptied.
+    fn start_film(&mut self) {
+        self.forget_film();
+        self.pacing.restart();
+        self.rate = Rate::default();
     }
 
     /// The film is about to start anew.

@@ -9,11 +9,11 @@ use glam::Vec3;
 
 use super::attention_tools::{self, ToolState};
 use super::controls::{Controls, MODES, Readout, TONE_MAPS, clock, metric};
-use super::engine::HeadsetReadout;
+use super::engine::{HeadsetReadout, Message};
 use super::file_menu;
 use super::histogram;
 use super::seeing;
-use super::split_panel::{self, SplitTimes};
+use super::split_panel::SplitTimes;
 use super::theme;
 use crate::cli::choices::{Clip, EccentricityAt, Mode, Model};
 use crate::cli::values::EXPOSURE_EV;
@@ -108,8 +108,8 @@ pub enum Action {
     LeaveHeadset,
     /// Open or save a file.
     File(file_menu::Action),
-    /// Go on with split times.
-    Split(split_panel::Action),
+    /// Tell what came of something.
+    Tell(Message),
 }
 
 /// What the panel shows and cannot change.
@@ -175,7 +175,7 @@ pub fn panel(
                 attention_tools::panel(ui, tools, &mut controls.attention, facts.gaze);
             });
             ui.collapsing("Split times", |ui| {
-                actions.extend(split.show(ui, facts.selected, Instant::now()).map(Action::Split));
+                actions.extend(split.show(ui, facts.selected, Instant::now()).map(Action::Tell));
             });
             ui.collapsing("Pixel at the gaze", |ui| pixel(ui, facts));
             ui.collapsing("Sampling and screen", |ui| sampling(ui, facts, controls, visibility));

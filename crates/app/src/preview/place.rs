@@ -12,6 +12,8 @@ const CORNER: f32 = 40.0;
 
 /// The window's place as it is; a maximised, minimised or full-screen one goes back to where it was before.
 pub fn of(ctx: &Context, before: Option<WindowPlace>) -> Option<WindowPlace> {
+    // A window opens without zoom, and points are larger with it.
+    let zoom = ctx.zoom_factor();
     ctx.input(|input| {
         let viewport = input.viewport();
         let is = |state: Option<bool>| state == Some(true);
@@ -22,8 +24,9 @@ pub fn of(ctx: &Context, before: Option<WindowPlace>) -> Option<WindowPlace> {
             return before.map(|place| WindowPlace { maximized: true, ..place });
         }
         // Halves of points are the window system's, not a person's.
-        let pair = |x: f32, y: f32| [x.round(), y.round()];
-        let size = viewport.inner_rect?.size();
+        let pair = |x: f32, y: f32| [x, y].map(|points| (points * zoom).round());
+        // Wayland tells no window where it is, but how large it is.
+        let size = viewport.inner_rect.unwrap_or_else(|| input.viewport_rect()).size();
         let position = viewport.outer_rect.map(|rect| pair(rect.min.x, rect.min.y));
         Some(WindowPlace { size: pair(size.x, size.y), position, maximized: false })
     })
@@ -62,7 +65,43 @@ fn can_be_seen(window: RectPx, monitors: &[RectPx]) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use egui::{RawInput, Rect, ViewportId, ViewportInfo, pos2, vec2};
+
     use super::*;
+
+    /// The place of a window of 1200x800 points of the system's, zoomed; `is_told`: the system says where it is.
+    fn placed(zoom: f32, is_told: bool) -> Option<WindowPlace> {
+        let ctx = Context::default();
+        let rect = |x: f32, y: f32| Rect::from_min_size(pos2(x, y), vec2(1200.0, 800.0)) / zoom;
+        let viewport = ViewportInfo {
+            native_pixels_per_point: Some(2.0),
+            inner_rect: is_told.then(|| rect(100.0, 60.0)),
+            outer_rect: is_told.then(|| rect(96.0, 30.0)),
+            ..ViewportInfo::default()
+        };
+        let mut place = None;
+        // A zoom begins with the frame after it was set, which egui scales by itself.
+        for _ in 0..3 {
+            let viewports = [(ViewportId::ROOT, viewport.clone())].into_iter().collect();
+            let input = RawInput { screen_rect: Some(rect(0.0, 0.0)), viewports, ..RawInput::default() };
+            let mut output = ctx.run_ui(input, |ui| {
+                ui.ctx().set_zoom_factor(zoom);
+                place = of(ui.ctx(), None);
+            });
+            output.textures_delta.clear();
+        }
+        place
+    }
+
+    #[test]
+    fn a_window_is_as_large_whatever_its_zoom_and_where_nobody_says_where_it_is() {
+        for zoom in [0.5, 1.0, 1.25] {
+            let size = [1200.0, 800.0];
+            let told = WindowPlace { size, position: Some([96.0, 30.0]), maximized: false };
+            assert_eq!(placed(zoom, true), Some(told), "{zoom}");
+            assert_eq!(placed(zoom, false), Some(WindowPlace { position: None, ..told }), "{zoom}");
+        }
+    }
 
     #[test]
     fn a_window_beside_all_screens_is_noticed() {

@@ -1,42 +1,48 @@
 //! The split times in the window: a panel to start a run, keys while it goes on, files when it is done.
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
 
 use egui::{Align2, Area, Context, DragValue, Id, Key, Modifiers, RichText, Ui};
 use tracer::provenance::Provenance;
 
-use super::controls::MODES;
+use super::controls::{Controls, MODES};
+use super::engine::Message;
 use super::theme;
 use crate::cli::choices::Mode;
-use crate::output::{OutputError, free_names, write_atomically};
+use crate::config;
+use crate::output::{OutputError, check_writable, free_names, write_atomically};
 use crate::split_times::{After, Moment, Plan, Run};
 
 /// How long until the window looks whether results are written.
 const LOOK_AGAIN: Duration = Duration::from_millis(50);
 
-/// What a run asks of the window.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Action {
-    /// Show this mode from an empty film.
-    Show(Mode),
-    /// Tell this; true when something went wrong.
-    Tell(String, bool),
+/// A run that is done.
+#[derive(Clone, Debug)]
+struct Finished {
+    run: Run,
+    scene: String,
+    adapter: String,
 }
 
 /// The panel and the run that goes on.
 pub struct SplitTimes {
     /// The next run's plan.
     pub plan: Plan,
+    /// Where results go: the first that can be written counts.
+    pub folders: Vec<PathBuf>,
     run: Option<Run>,
     /// When the film of the present trial was emptied.
     started: Option<Instant>,
+    /// Trials that were shown, of all runs.
+    shown: u64,
     /// The last run's medians.
     summary: Vec<String>,
-    /// The last run's results on their way to their files.
-    writing: Option<JoinHandle<Action>>,
+    /// Runs whose results are on their way to their files, and those that could be written nowhere.
+    writing: Option<JoinHandle<(Message, Vec<Finished>)>>,
+    unwritten: Vec<Finished>,
 }
 
 impl Drop for SplitTimes {
@@ -53,7 +59,17 @@ impl Default for SplitTimes {
     fn default() -> Self {
         let plan =
             Plan { modes: MODES.map(|entry| entry.0).to_vec(), repetitions: 3, blind: true, object: String::new() };
-        Self { plan, run: None, started: None, summary: Vec::new(), writing: None }
+        let folders = [Some(PathBuf::new()), config::folder(), Some(std::env::temp_dir())];
+        Self {
+            plan,
+            folders: folders.into_iter().flatten().collect(),
+            run: None,
+            started: None,
+            shown: 0,
+            summary: Vec::new(),
+            writing: None,
+            unwritten: Vec::new(),
+        }
     }
 }
 
@@ -63,8 +79,16 @@ impl SplitTimes {
         self.run.as_ref().is_some_and(|run| run.plan().blind)
     }
 
+    /// What the picture is to show: while a run goes on the mode of its trial alone, whatever else is set.
+    pub fn controls(&self, set: &Controls) -> Controls {
+        match self.run.as_ref().and_then(Run::mode) {
+            Some(mode) => Controls { mode, comparison: None, paused: false, trial: Some(self.shown), ..set.clone() },
+            None => set.clone(),
+        }
+    }
+
     /// Draws the panel's part; `selected` names what is selected in the scene.
-    pub fn show(&mut self, ui: &mut Ui, selected: &str, now: Instant) -> Option<Action> {
+    pub fn show(&mut self, ui: &mut Ui, selected: &str, now: Instant) -> Option<Message> {
         for (mode, name, hint) in MODES {
             let mut wanted = self.plan.modes.contains(&mode);
             if ui.checkbox(&mut wanted, format!("Compare {name}")).on_hover_text(hint).changed() {
@@ -84,6 +108,9 @@ impl SplitTimes {
         for line in &self.summary {
             ui.label(RichText::new(line).small());
         }
+        if self.writing.is_none() && !self.unwritten.is_empty() && ui.button("Write results again").clicked() {
+            return self.write();
+        }
         if !started.on_hover_text(hint).clicked() {
             return None;
         }
@@ -92,11 +119,17 @@ impl SplitTimes {
         self.start(seed, now)
     }
 
-    /// Starts a run.
-    pub fn start(&mut self, seed: u64, now: Instant) -> Option<Action> {
+    /// Starts a run, unless its results could be written nowhere; what there is to tell.
+    pub fn start(&mut self, seed: u64, now: Instant) -> Option<Message> {
+        let told = match somewhere(&self.folders, |[csv, _]| check_writable(csv)) {
+            (None, error) => return Some(Message::now(format!("no split times: {}", reason(error)), true)),
+            (Some(_), None) => None,
+            (Some([csv, _]), error) => Some(format!("{}; split times will be {}", reason(error), csv.display())),
+        };
         self.run = Run::new(self.plan.clone(), seed);
         self.started = Some(now);
-        self.run.as_ref()?.mode().map(Action::Show)
+        self.shown += 1;
+        told.map(|text| Message::now(text, true))
     }
 
     /// Whether a run goes on.
@@ -110,21 +143,25 @@ impl SplitTimes {
     }
 
     /// Tells that results have been written, or why not.
-    pub fn written(&mut self, ctx: &Context) -> Option<Action> {
+    pub fn written(&mut self, ctx: &Context) -> Option<Message> {
         if self.writing.as_ref().is_some_and(|writing| !writing.is_finished()) {
             ctx.request_repaint_after(LOOK_AGAIN);
             return None;
         }
         // As when the window closes.
-        self.writing.take()?.join().ok()
+        let (told, left) = self.writing.take()?.join().ok()?;
+        // A run may have ended meanwhile.
+        let told = if self.unwritten.is_empty() { told } else { self.write().unwrap_or(told) };
+        self.unwritten.extend(left);
+        Some(told)
     }
 
     /// Takes the run's keys. `samples` and `gaze_deg` are those of this moment.
-    pub fn keys(&mut self, ctx: &Context, now: Instant, moment: (u64, [f64; 2]), scene: &Scene<'_>) -> Vec<Action> {
-        let Some(run) = &mut self.run else { return Vec::new() };
+    pub fn keys(&mut self, ctx: &Context, now: Instant, moment: (u64, [f64; 2]), scene: &Scene<'_>) -> Option<Message> {
+        let run = self.run.as_mut()?;
         // Letters of a text are no answers.
         if ctx.egui_wants_keyboard_input() {
-            return Vec::new();
+            return None;
         }
         let pressed = |key| ctx.input_mut(|input| input.consume_key(Modifiers::NONE, key));
         let elapsed = self.started.map_or(Duration::ZERO, |started| now.saturating_duration_since(started));
@@ -133,40 +170,42 @@ impl SplitTimes {
             run.outline(moment);
         }
         if !pressed(Key::P) {
-            return Vec::new();
+            return None;
         }
         match run.material(moment) {
-            After::Nothing | After::Kept => Vec::new(),
+            After::Nothing | After::Kept => None,
             After::NextTrial => {
                 self.started = Some(now);
-                run.mode().map(Action::Show).into_iter().collect()
+                self.shown += 1;
+                None
             }
             After::Done => self.finish(scene),
         }
     }
 
-    fn finish(&mut self, scene: &Scene<'_>) -> Vec<Action> {
-        let Some(run) = self.run.take() else { return Vec::new() };
-        let short = |mode| MODES.iter().find(|entry| entry.0 == mode).map_or("", |entry| entry.1);
+    fn finish(&mut self, scene: &Scene<'_>) -> Option<Message> {
+        let run = self.run.take()?;
         let line = |(mode, count, outline, material)| {
-            format!("{}: outline {outline:.1} s, material {material:.1} s ({count})", short(mode))
+            format!("{}: outline {outline:.1} s, material {material:.1} s ({count})", name(mode))
         };
         self.summary = run.medians().into_iter().map(line).collect();
-        let [name, adapter] = [scene.name, scene.adapter].map(ToOwned::to_owned);
-        let folder = scene.folder.to_owned();
-        let spawned = std::thread::Builder::new().name("write split times".into()).spawn(move || {
-            let names = free_names(&folder, "split-times", ["csv", "svg"]);
-            match write(&names, &[run.csv(&name, &Provenance::without_gpu(&adapter)), run.svg()]) {
-                Ok(()) => Action::Tell(format!("{} and its .svg", names[0].display()), false),
-                Err(error) => Action::Tell(error.to_string(), true),
-            }
-        });
-        match spawned {
+        let [scene, adapter] = [scene.name, scene.adapter].map(ToOwned::to_owned);
+        self.unwritten.push(Finished { run, scene, adapter });
+        // Results that are being written come back before others go.
+        if self.writing.is_some() { None } else { self.write() }
+    }
+
+    /// Writes the results of all runs that are not written yet; why that cannot begin.
+    fn write(&mut self) -> Option<Message> {
+        let (folders, runs) = (self.folders.clone(), self.unwritten.clone());
+        let thread = std::thread::Builder::new().name("write split times".into());
+        match thread.spawn(move || write_all(&folders, runs)) {
             Ok(writing) => {
                 self.writing = Some(writing);
-                Vec::new()
+                self.unwritten.clear();
+                None
             }
-            Err(error) => vec![Action::Tell(format!("split times are not written: {error}"), true)],
+            Err(error) => Some(Message::now(format!("split times are not written: {error}"), true)),
         }
     }
 
@@ -174,6 +213,7 @@ impl SplitTimes {
     pub fn banner(&self, ctx: &Context) {
         let Some(run) = &self.run else { return };
         let (trial, all) = run.progress();
+        let mode = run.mode().filter(|_| !run.plan().blind).map_or("", name);
         let wanted = if run.waits_for_outline() { "O: the outline is visible" } else { "P: the material is visible" };
         let area = Area::new(Id::unique("split times")).anchor(Align2::CENTER_TOP, egui::vec2(0.0, 10.0));
         area.order(egui::Order::Foreground).interactable(false).show(ctx, |ui| {
@@ -181,10 +221,55 @@ impl SplitTimes {
                 let object = &run.plan().object;
                 let object = if object.is_empty() { String::new() } else { format!("Look at {object}.  ") };
                 ui.label(RichText::new(format!("{object}{wanted}")).color(theme::accent(ui)));
-                ui.label(RichText::new(format!("{trial} of {all}; Esc ends the run")).small().weak());
+                let mode = if mode.is_empty() { String::new() } else { format!("{mode}, ") };
+                ui.label(RichText::new(format!("{mode}{trial} of {all}; Esc ends the run")).small().weak());
             });
         });
     }
+}
+
+fn name(mode: Mode) -> &'static str {
+    MODES.iter().find(|entry| entry.0 == mode).map_or("", |entry| entry.1)
+}
+
+/// Does something with names in the first folder where that can be done; these names, and why not in a folder before.
+fn somewhere(
+    folders: &[PathBuf],
+    mut put: impl FnMut(&[PathBuf; 2]) -> Result<(), OutputError>,
+) -> (Option<[PathBuf; 2]>, Option<OutputError>) {
+    let mut trouble = None;
+    for folder in folders {
+        let names = free_names(folder, "split-times", ["csv", "svg"]);
+        match put(&names) {
+            Ok(()) => return (Some(names), trouble),
+            Err(error) => trouble = trouble.or(Some(error)),
+        }
+    }
+    (None, trouble)
+}
+
+fn reason(error: Option<OutputError>) -> String {
+    error.map(|error| error.to_string()).unwrap_or_default()
+}
+
+/// Writes results where that can be done; what there is to tell, and the runs whose results could be written nowhere.
+fn write_all(folders: &[PathBuf], runs: Vec<Finished>) -> (Message, Vec<Finished>) {
+    let (mut told, mut wrong, mut left) = (Vec::new(), false, Vec::new());
+    for finished in runs {
+        let Finished { run, scene, adapter } = &finished;
+        let texts = [run.csv(scene, &Provenance::without_gpu(adapter)), run.svg()];
+        let (names, error) = somewhere(folders, |names| write(names, &texts));
+        wrong |= error.is_some();
+        let elsewhere = error.map(|error| format!("{error}; ")).unwrap_or_default();
+        match names {
+            Some([csv, _]) => told.push(format!("{elsewhere}{} and its .svg", csv.display())),
+            None => {
+                told.push(format!("{elsewhere}the results are kept until they can be written (Split times)"));
+                left.push(finished);
+            }
+        }
+    }
+    (Message::now(told.join("; "), wrong), left)
 }
 
 fn write(names: &[PathBuf; 2], texts: &[String; 2]) -> Result<(), OutputError> {
@@ -200,6 +285,4 @@ pub struct Scene<'a> {
     pub name: &'a str,
     /// The adapter's.
     pub adapter: &'a str,
-    /// Where the results go.
-    pub folder: &'a Path,
 }

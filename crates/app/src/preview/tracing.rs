@@ -95,6 +95,8 @@ pub struct Tracing {
     keeps_film: bool,
     /// The other film of a comparison.
     beside: Option<Side>,
+    /// The trial of split times that the film is of.
+    trial: Option<u64>,
     seeing: Seeing,
     /// What the last version of the scene took, and how long altogether.
     scene_report: Option<(SceneReport, Duration)>,
@@ -119,6 +121,7 @@ impl Tracing {
             traced: Duration::ZERO,
             keeps_film: false,
             beside: None,
+            trial: None,
             seeing: Seeing::default(),
             scene_report: None,
             rehearsals: Rehearsals::default(),
@@ -246,6 +249,17 @@ impl Tracing {
         let turned = self.view != Some(view);
         self.view = Some(view);
         Ok(moved || turned)
+    }
+
+    /// Starts film and picture anew, with nothing of what was there before, when another trial of split times begins. True when one does.
+    pub fn begin_trial(&mut self, trial: Option<u64>) -> bool {
+        let begins = trial.is_some() && self.trial != trial;
+        self.trial = trial;
+        if let Some(Open { renderer: Some(renderer), .. }) = self.open.as_mut().filter(|_| begins) {
+            renderer.restart_clean();
+            self.traced = Duration::ZERO;
+        }
+        begins
     }
 
     /// Puts an empty film of another plan in the place of the present one, if there is one.
@@ -542,8 +556,8 @@ fn view_settings(look: &Look, size: [u32; 2]) -> ViewSettings {
         tone_map: look.controls.tone_map.into(),
         debug_view: look.controls.shown,
         fill: true,
-        // Two modes are compared by what they have sampled.
-        denoise: look.controls.denoise && look.controls.comparison.is_none(),
+        // Modes are compared by what they have sampled.
+        denoise: look.controls.denoise && look.controls.comparison.is_none() && look.controls.trial.is_none(),
         ring: None,
     }
 }

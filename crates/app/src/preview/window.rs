@@ -1,6 +1,6 @@
 //! The window: the picture, what lies over it, and what mouse and keys do.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
@@ -31,7 +31,7 @@ use super::versions::Versions;
 use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
 use crate::preferences::Store;
-use crate::reload::Loader;
+use crate::reload::{Loader, Watched};
 use crate::session::Source;
 
 mod files;
@@ -69,7 +69,9 @@ pub struct Window {
     /// What is done with it.
     editor: Option<Editor>,
     unsaved: Unsaved,
-    /// The present scene is opened again: what is heard until then is of another.
+    /// The present scene as its files are watched.
+    watched: Option<Watched>,
+    /// The loader goes back to that: what is heard until it does is of another scene.
     going_back: bool,
     /// The version that the engine has been given.
     given: Option<Arc<Scene>>,
@@ -113,6 +115,7 @@ impl Window {
             gaze_direction: None,
             editor: None,
             unsaved: Unsaved::default(),
+            watched: None,
             going_back: false,
             given: None,
             camera: 0,
@@ -171,7 +174,7 @@ impl Window {
         let look = Look {
             standpoint: navigation.standpoint,
             gaze,
-            controls: self.controls.clone(),
+            controls: self.split.controls(&self.controls),
             mapping,
             size_px: UVec2::new(pixels.x.round().max(1.0) as u32, pixels.y.round().max(1.0) as u32),
             pointer,
@@ -224,16 +227,16 @@ impl Window {
 
     /// What the keys of a run of split times do.
     fn split_keys(&mut self, ctx: &Context, state: &State) {
-        if let Some(action) = self.split.written(ctx) {
-            self.act(Action::Split(action));
+        if let Some(told) = self.split.written(ctx) {
+            self.note = Some(told);
         }
         let Some((open, _)) = &self.scene else { return };
         let gaze = self.gaze_direction.unwrap_or(Vec3::NEG_Z);
         let (yaw, pitch) = crate::view::yaw_pitch(gaze);
         let gaze_deg = [yaw, pitch].map(|angle| f64::from(angle.to_degrees()));
-        let scene = split_panel::Scene { name: &open.name, adapter: &self.adapter, folder: Path::new("") };
-        let actions = self.split.keys(ctx, Instant::now(), (state.readout.samples, gaze_deg), &scene);
-        actions.into_iter().for_each(|action| self.act(Action::Split(action)));
+        let scene = split_panel::Scene { name: &open.name, adapter: &self.adapter };
+        let told = self.split.keys(ctx, Instant::now(), (state.readout.samples, gaze_deg), &scene);
+        self.note = told.or(self.note.take());
     }
 
     fn show_editor(&mut self, ctx: &Context) {
@@ -297,12 +300,7 @@ impl Window {
             Action::EnterHeadset => self.engine.request(Request::EnterHeadset),
             Action::LeaveHeadset => self.engine.request(Request::LeaveHeadset),
             Action::File(action) => self.act_on_file(action),
-            Action::Split(split_panel::Action::Show(mode)) => {
-                (self.controls.mode, self.controls.comparison) = (mode, None);
-                self.controls.paused = false;
-                self.engine.request(Request::Restart);
-            }
-            Action::Split(split_panel::Action::Tell(text, wrong)) => self.note = Some(Message::now(text, wrong)),
+            Action::Tell(message) => self.note = Some(message),
         }
     }
 
@@ -402,14 +400,16 @@ impl eframe::App for Window {
             self.gaze_direction = Some(look.standpoint.view.direction_at(gaze.point));
             attention_tools::draw(ui.painter(), rect, &look.standpoint, &self.controls.attention);
             // A headset's mirror has its own.
-            if self.visibility.ring && self.controls.mode == Mode::Fv && state.headset.is_none() {
+            let shows_ring = self.visibility.ring && look.controls.mode == Mode::Fv && !self.split.hides_mode();
+            if shows_ring && state.headset.is_none() {
                 ui.painter().extend(fovea_ring(&look.mapping, rect, gaze));
             }
             if self.visibility.eccentricity && state.headset.is_none() {
                 let at = self.controls.eccentricity;
                 eccentricity::draw(ui.painter(), &look.mapping, &look.standpoint, rect, gaze, at);
             }
-            if let Some(comparison) = self.controls.comparison.as_mut().filter(|_| state.headset.is_none()) {
+            let compares = state.headset.is_none() && !self.split.is_running();
+            if let Some(comparison) = self.controls.comparison.as_mut().filter(|_| compares) {
                 compare::wipe(ui, rect, self.controls.mode, comparison, &state.readout);
             }
             if let Some(editor) = self.editor.as_mut().filter(|_| !self.gaze.shows_dots()) {

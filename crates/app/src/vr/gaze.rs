@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use glam::{Quat, Vec3};
 
-use crate::gaze::filter::{FilterSettings, Filtered, GazeFilter, Phase};
+use crate::gaze::filter::{FilterSettings, Filtered, GazeFilter, LOST_SECS, Phase};
 use crate::view::{direction, yaw_pitch};
 
 /// A gaze farther than this from the anchor moves the anchor, radians.
@@ -56,6 +56,8 @@ pub struct EyeGaze {
     epoch: Instant,
     film_from_anchor: Quat,
     last: Option<Instant>,
+    /// When the last answer came that was newer than the one before.
+    heard: Instant,
     live: Option<Live>,
 }
 
@@ -76,6 +78,7 @@ impl EyeGaze {
             epoch: now,
             film_from_anchor: Quat::IDENTITY,
             last: None,
+            heard: now,
             live: None,
         }
     }
@@ -85,7 +88,7 @@ impl EyeGaze {
         if self.last.is_some_and(|last| sample.captured <= last) {
             return;
         }
-        self.last = Some(sample.captured);
+        (self.last, self.heard) = (Some(sample.captured), sample.arrived);
         let looked = sample.local_from_gaze.map(|gaze| film_from_local * gaze * Vec3::NEG_Z);
         if let Some(looked) = looked
             && looked.dot(self.film_from_anchor * Vec3::NEG_Z) < REACH.cos()
@@ -110,9 +113,11 @@ impl EyeGaze {
         self.live = Some(Live { direction, phase, captured, time_known: sample.time_known });
     }
 
-    /// Where the eyes look, in film space; `None` before the first sample and when they are lost.
-    pub fn direction(&self) -> Option<Vec3> {
-        self.live.filter(|live| live.phase != Phase::Lost).map(|live| live.direction)
+    /// Where the eyes look, in film space; `None` before the first sample and when they are lost, which they also are when no
+    /// answers come any more: a session that is not focused gets none.
+    pub fn direction(&self, now: Instant) -> Option<Vec3> {
+        let is_heard = now.saturating_duration_since(self.heard).as_secs_f64() <= LOST_SECS;
+        self.live.filter(|live| is_heard && live.phase != Phase::Lost).map(|live| live.direction)
     }
 
     /// Age of the sample behind the direction; `None` where the runtime does not tell when it was taken.
@@ -153,7 +158,7 @@ mod tests {
                     Quat::from_axis_angle(towards.any_orthonormal_vector(), 0.0017 * (step as f32 * 2.4).sin());
                 gaze.take(sample(start + ms(step * 8), Some(wobble * towards)), film_from_local);
             }
-            let off = gaze.direction().unwrap().angle_between(film_from_local * towards).to_degrees();
+            let off = gaze.direction(start + ms(480)).unwrap().angle_between(film_from_local * towards).to_degrees();
             assert!(off < 0.1, "{towards}: {off} degrees");
         }
     }
@@ -172,15 +177,30 @@ mod tests {
             now
         };
         feed(&mut gaze, Some(from), 40);
-        feed(&mut gaze, Some(to), 1);
-        assert!(gaze.direction().unwrap().angle_between(to) < 1e-3, "with the first sample after it");
+        let landed = feed(&mut gaze, Some(to), 1);
+        assert!(gaze.direction(landed).unwrap().angle_between(to) < 1e-3, "with the first sample after it");
         let seen = feed(&mut gaze, Some(to), 40);
         let closed = feed(&mut gaze, None, 30);
         assert_eq!(gaze.phase(), Some(Phase::Blink));
-        assert!(gaze.direction().unwrap().angle_between(to) < 1e-3, "the place is held");
+        assert!(gaze.direction(closed).unwrap().angle_between(to) < 1e-3, "the place is held");
         assert_eq!(gaze.age(closed), Some(closed - seen), "it is as old as the last sight of the eye");
-        feed(&mut gaze, None, 60);
-        assert_eq!(gaze.direction(), None, "after half a second the eyes are lost");
+        let lost = feed(&mut gaze, None, 60);
+        assert_eq!(gaze.direction(lost), None, "after half a second the eyes are lost");
+    }
+
+    #[test]
+    fn eyes_that_nothing_is_heard_of_are_lost_until_they_are_heard_of_again() {
+        let start = Instant::now();
+        let mut gaze = EyeGaze::new(start);
+        (1..40).for_each(|step| gaze.take(sample(start + ms(8 * step), Some(Vec3::NEG_Z)), Quat::IDENTITY));
+        let last = start + ms(8 * 39);
+        assert!(gaze.direction(last + ms(400)).is_some(), "as in a blink");
+        // A runtime that says the same again has nothing new to say.
+        gaze.take(GazeSample { arrived: last + ms(590), ..sample(last, Some(Vec3::NEG_Z)) }, Quat::IDENTITY);
+        assert_eq!(gaze.direction(last + ms(600)), None);
+        let back = last + ms(5000);
+        (1..20).for_each(|step| gaze.take(sample(back + ms(8 * step), Some(Vec3::X)), Quat::IDENTITY));
+        assert!(gaze.direction(back + ms(160)).unwrap().angle_between(Vec3::X) < 1e-3);
     }
 
     #[test]
@@ -189,6 +209,6 @@ mod tests {
         let mut gaze = EyeGaze::new(start);
         gaze.take(sample(start + ms(8), Some(Vec3::NEG_Z)), Quat::IDENTITY);
         gaze.take(sample(start + ms(8), Some(Vec3::X)), Quat::IDENTITY);
-        assert!(gaze.direction().unwrap().distance(Vec3::NEG_Z) < 1e-6);
+        assert!(gaze.direction(start + ms(8)).unwrap().distance(Vec3::NEG_Z) < 1e-6);
     }
 }

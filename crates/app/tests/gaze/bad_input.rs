@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use fovea_app::gaze::feed::MAX_SAMPLES;
-use fovea_app::gaze::parse::trace::Row;
+use fovea_app::gaze::parse::trace::{Row, Trace};
 use fovea_app::gaze::parse::zmtp;
 use fovea_app::gaze::source::{GazeSource, SourceState};
 
@@ -56,6 +56,30 @@ fn with_server(
         client(&mut stream, number, stop);
     });
     (open(&format!("opengaze::{port}")), connections, stop)
+}
+
+#[cfg(unix)]
+#[test]
+fn a_full_disc_leaves_a_recording_of_whole_rows() {
+    let folder = std::env::temp_dir().join(format!("fovea-full-disc-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    let [from, to] = ["from.csv", "to.csv"].map(|name| folder.join(name));
+    let eye = Synthetic::new(120.0, 0.5, 0.1, 3).trace;
+    std::fs::write(&from, eye.write()).unwrap();
+    // To a program that may write no file of more than a block the disc is full within a row.
+    let script = "ulimit -f 1; trap '' XFSZ; exec \"$0\" gaze --source \"trace:$1\" --record \"$2\"";
+    let mut command = std::process::Command::new("sh");
+    let output = command.args(["-c", script, env!("CARGO_BIN_EXE_fovea")]).args([&from, &to]).output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success() && message.contains("to.csv"), "{message}");
+    let text = std::fs::read_to_string(&to).unwrap();
+    assert!(text.ends_with('\n'), "{text}");
+    let rows = Trace::parse(&text).unwrap().rows;
+    // Six digits of the time, which begins anew with the recording.
+    assert!((5..eye.rows.len()).contains(&rows.len()), "{} rows", rows.len());
+    assert!(rows.iter().zip(&eye.rows).all(|(row, sent)| (row.time_secs - sent.time_secs).abs() < 2e-6));
+    std::fs::remove_dir_all(folder).unwrap();
 }
 
 #[test]
@@ -248,6 +272,54 @@ fn unknown_msgpack_types_are_told_and_the_next_message_is_read() {
     assert_eq!(samples.iter().map(|sample| sample.device_secs).collect::<Vec<_>>(), [1.0, 2.0]);
     let status = source.status();
     assert!(status.dropped >= 2 && !status.synchronised, "{status:?}");
+    stop.set();
+}
+
+#[test]
+fn a_surface_that_is_out_of_sight_is_no_lost_connection_and_clocks_are_compared_all_the_while() {
+    let (stop, started, connections) = (Stop::default(), Instant::now(), Arc::new(AtomicU32::new(0)));
+    // Somebody sets Pupil's clock back while nothing comes.
+    let clock = move || started.elapsed().as_secs_f64() + if started.elapsed().as_secs() < 3 { 5000.0 } else { 100.0 };
+    let publisher = serve(&stop, move |mut stream, stop| {
+        write(&mut stream, &[&zmtp::greeting()[..], &zmtp::ready("PUB")].concat());
+        std::thread::sleep(Duration::from_millis(11_500));
+        let row = Row { time_secs: 0.0, point: [0.25, 0.5], valid: true, confidence: 1.0 };
+        let payload = pupil::message("s", &[(clock() - 0.08, row)]);
+        write(&mut stream, &[zmtp::frame(b"surfaces.s", true), zmtp::frame(&payload, false)].concat());
+        linger(&mut stream, stop);
+    });
+    let counted = Arc::clone(&connections);
+    let port = serve(&stop, move |stream, _| {
+        counted.fetch_add(1, Ordering::Relaxed);
+        pupil::remote(stream, publisher, clock);
+    });
+    let mut source = open(&format!("pupil::{port}"));
+    wait_for(source.as_mut(), 3.0, |status| status.state == SourceState::Connected);
+    wait_for(source.as_mut(), 3.0, |status| status.state == SourceState::Stalled);
+    let samples = collect(source.as_mut(), 12.0, |samples| !samples.is_empty());
+    assert_eq!((samples.len(), connections.load(Ordering::Relaxed)), (1, 1), "{:?}", source.status());
+    let age = samples[0].arrived - samples[0].captured;
+    assert!((80..150).contains(&age.as_millis()), "{age:?}");
+    stop.set();
+}
+
+#[test]
+fn a_peer_that_answers_is_tried_again_at_once() {
+    let (stop, connections) = (Stop::default(), Arc::new(AtomicU32::new(0)));
+    let publisher = serve(&stop, |mut stream, _| {
+        write(&mut stream, &[&zmtp::greeting()[..], &zmtp::ready("PUB")].concat());
+        std::thread::sleep(Duration::from_millis(50));
+    });
+    let (counted, started) = (Arc::clone(&connections), Instant::now());
+    let port = serve(&stop, move |stream, _| {
+        counted.fetch_add(1, Ordering::Relaxed);
+        pupil::remote(stream, publisher, || started.elapsed().as_secs_f64());
+    });
+    let _source = open(&format!("pupil::{port}"));
+    std::thread::sleep(Duration::from_secs(4));
+    // 0.3 s each; 0, 0.3, 0.85, 1.9 and 3.95 s after the start if pauses grew.
+    let tries = connections.load(Ordering::Relaxed);
+    assert!((7..=14).contains(&tries), "{tries} connections in 4 s");
     stop.set();
 }
 

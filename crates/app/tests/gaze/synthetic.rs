@@ -94,7 +94,7 @@ impl Synthetic {
             distance_mm: Some(650.0),
             rate_hz: Some(rate_hz),
         };
-        Self { trace: Trace { header, rows }, truth }
+        Self { trace: Trace { header, rows, is_cut_off: false }, truth }
     }
 }
 

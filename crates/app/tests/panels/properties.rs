@@ -84,6 +84,29 @@ fn sliders_and_strengths_are_typed_like_all_numbers() {
 }
 
 #[test]
+fn a_colour_without_strength_is_the_same_when_it_is_strong_again() {
+    let mut loaded = session::load(&Source::BuiltIn, &args().scene).unwrap();
+    let scene = Arc::make_mut(&mut loaded.scene);
+    Arc::make_mut(&mut scene.materials[0]).emission = Vec3::new(1.0, 0.5, 0.25);
+    Arc::make_mut(&mut scene.materials[1]).emission = Vec3::ZERO;
+    let state = PanelState { tab: Tab::Materials, selected: Some(Part::Material(0)), ..PanelState::default() };
+    let mut harness = scene_harness(Document::new(&loaded), state);
+    let strong = |harness: &mut Harness<'_, Scene>, strength: &str| {
+        write(harness, "Strength", strength);
+        press(harness, Key::Enter);
+        [0, 1].map(|index| harness.state().document.version().materials[index].emission)
+    };
+    assert_eq!(strong(&mut harness, "0"), [Vec3::ZERO; 2]);
+    // Another colour that has none is another.
+    harness.state_mut().panel.selected = Some(Part::Material(1));
+    harness.run_steps(2);
+    assert_eq!(strong(&mut harness, "2"), [Vec3::ZERO, Vec3::splat(2.0)]);
+    harness.state_mut().panel.selected = Some(Part::Material(0));
+    harness.run_steps(2);
+    assert_eq!(strong(&mut harness, "8"), [Vec3::new(8.0, 4.0, 2.0), Vec3::splat(2.0)]);
+}
+
+#[test]
 fn what_is_selected_stays_as_the_file_has_it() {
     let mut loaded = session::load(&Source::BuiltIn, &args().scene).unwrap();
     let scene = Arc::make_mut(&mut loaded.scene);

@@ -321,7 +321,7 @@ fn saccades_are_followed_and_blinks_are_held() {
             }
             eyes.take(sample, Quat::IDENTITY);
             let raw = sample.local_from_gaze.map(|gaze| gaze * Vec3::NEG_Z);
-            let Some(found) = eyes.direction() else { continue };
+            let Some(found) = eyes.direction(now) else { continue };
             match raw {
                 Some(raw) => {
                     let jumped = last_raw.is_some_and(|last| last.angle_between(raw) > 0.05);

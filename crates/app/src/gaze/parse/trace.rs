@@ -192,6 +192,8 @@ pub struct Trace {
     pub header: Header,
     /// In order of time, at least one.
     pub rows: Vec<Row>,
+    /// The file ends within a row, which is left out: whoever wrote it was stopped.
+    pub is_cut_off: bool,
 }
 
 impl Trace {
@@ -200,10 +202,10 @@ impl Trace {
     /// # Errors
     /// The first line or row that is wrong, by its number.
     pub fn parse(text: &str) -> Result<Self, ParseError> {
-        let mut lines = text.lines().enumerate();
+        let mut lines = text.lines().enumerate().peekable();
         let header = Header::parse(lines.next().map_or("", |(_, line)| line))?;
-        let mut rows: Vec<Row> = Vec::new();
-        for (index, line) in lines {
+        let (mut rows, mut is_cut_off): (Vec<Row>, _) = (Vec::new(), false);
+        while let Some((index, line)) = lines.next() {
             let line = line.trim();
             if line.is_empty() || line.starts_with('#') || line == header.space.columns() {
                 continue;
@@ -212,7 +214,13 @@ impl Trace {
             if line.len() > MAX_ROW || rows.len() >= MAX_ROWS {
                 return Err(wrong("longer than any trace".into()));
             }
-            let row = Row::parse(line, header.space).map_err(wrong)?;
+            let row = match Row::parse(line, header.space) {
+                Err(_) if lines.peek().is_none() && !text.ends_with('\n') => {
+                    is_cut_off = true;
+                    break;
+                }
+                row => row.map_err(wrong)?,
+            };
             if let Some(last) = rows.last() {
                 let step = row.time_secs - last.time_secs;
                 // Two decimal times a microsecond apart can be a little less as binary ones.
@@ -226,7 +234,7 @@ impl Trace {
         if rows.is_empty() {
             return Err(ParseError::malformed("a gaze trace without rows"));
         }
-        Ok(Self { header, rows })
+        Ok(Self { header, rows, is_cut_off })
     }
 
     /// From the first row to the last, seconds.
@@ -298,5 +306,16 @@ mod tests {
         assert!(Trace::parse("").is_err());
         assert!(Trace::parse("# gaze-trace v1; space=screen01\n").unwrap_err().to_string().contains("without rows"));
         assert!(Trace::parse(&format!("{TEXT}{}", "9".repeat(MAX_ROW + 1))).is_err());
+    }
+
+    #[test]
+    fn a_last_row_that_is_cut_off_is_left_out() {
+        let whole = Trace::parse(TEXT).unwrap();
+        for half in ["0.", "0.016667,0.1", "0.016667,0.100000,0.250000,1"] {
+            let trace = Trace::parse(&format!("{TEXT}{half}")).unwrap();
+            assert_eq!((trace.rows.as_slice(), trace.is_cut_off), (whole.rows.as_slice(), true), "{half}");
+            assert!(Trace::parse(&format!("{TEXT}{half}\n")).is_err(), "{half}: a line that somebody has ended");
+        }
+        assert_eq!(Trace::parse(TEXT.trim_end()), Ok(whole), "a whole row needs no end of line");
     }
 }

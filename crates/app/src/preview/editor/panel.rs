@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use egui::{Align2, Area, Context, Id, Response, RichText, ScrollArea, TextEdit, Ui, WidgetInfo, accesskit};
 
 use super::gizmo::GizmoMode;
-use super::properties::{self, HeldAngles};
+use super::properties::{self, DarkColor, HeldAngles};
 use crate::document::edits::{Edit, Part};
 use crate::document::{Document, Gesture};
 use crate::preview::theme;
@@ -54,6 +54,8 @@ pub struct PanelState {
     pub environment: String,
     /// A rotation's angles while they are set.
     pub angles: Option<HeldAngles>,
+    /// Colours whose strength is 0: the scene does not know them any more.
+    pub dark: Vec<DarkColor>,
     /// The list is scrolled to what is selected.
     pub scroll_to_selected: bool,
 }

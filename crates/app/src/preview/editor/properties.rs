@@ -32,8 +32,8 @@ pub fn show(ui: &mut Ui, document: &Document, part: Part, state: &mut PanelState
     });
     match part {
         Part::Node(node) => show_node(ui, document, node, state, actions),
-        Part::Material(material) => show_material(ui, document, material, actions),
-        Part::Light(light) => show_light(ui, document, light, actions),
+        Part::Material(material) => show_material(ui, document, material, &mut state.dark, actions),
+        Part::Light(light) => show_light(ui, document, light, &mut state.dark, actions),
         Part::Environment => show_environment(ui, document, state, actions),
     }
 }
@@ -214,7 +214,7 @@ impl Place {
     }
 }
 
-fn show_material(ui: &mut Ui, document: &Document, index: u32, actions: &mut Vec<Action>) {
+fn show_material(ui: &mut Ui, document: &Document, index: u32, dark: &mut Vec<DarkColor>, actions: &mut Vec<Action>) {
     let Some(material) = document.version().materials.get(index as usize) else { return };
     Grid::new("material").num_columns(2).spacing([8.0, 4.0]).show(ui, |ui| {
         for parameter in MaterialParameter::ALL {
@@ -222,7 +222,8 @@ fn show_material(ui: &mut Ui, document: &Document, index: u32, actions: &mut Vec
             let edited = match parameter.get(material) {
                 Value::Number(number) => number_row(ui, &label, parameter, number),
                 Value::Color(color) if parameter == MaterialParameter::Emission => {
-                    strong_color(ui, &label, color).map(|(color, gesture)| (Value::Color(color), gesture))
+                    let strong = StrongColor { of: (Part::Material(index), "emission"), value: color };
+                    strong.show(ui, &label, dark).map(|(color, gesture)| (Value::Color(color), gesture))
                 }
                 Value::Color(color) => {
                     let mut rgb = color.to_array();
@@ -249,28 +250,50 @@ fn number_row(
     response.changed().then(|| (Value::Number(number), gesture(&response)))
 }
 
-/// A colour and its strength; the strength is the largest channel.
-fn strong_color(ui: &mut Ui, label: &Response, value: Vec3) -> Option<(Vec3, Gesture)> {
-    let mut strength = value.max_element();
-    let color = if strength > 0.0 { value / strength } else { Vec3::ONE };
-    let mut edited = None;
-    ui.horizontal(|ui| {
-        let mut rgb = color.to_array();
-        if ui.color_edit_button_rgb(&mut rgb).labelled_by(label.id).changed() {
-            let strength = if strength > 0.0 { strength } else { 1.0 };
-            edited = Some((Vec3::from_array(rgb) * strength, Gesture::GoesOn));
-        }
-        let speed = f64::from(strength.max(0.1)) * 0.01;
-        let response = ui.add(number_field(&mut strength).range(0.0..=1e6).speed(speed).max_decimals(3));
-        name_field(&response, "Strength".into());
-        if response.changed() {
-            edited = Some((color * strength, gesture(&response)));
-        }
-    });
-    edited
+/// What a colour belongs to.
+type ColorOf = (Part, &'static str);
+
+/// The colour of something whose strength is 0, for when it has one again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DarkColor {
+    of: ColorOf,
+    color: Vec3,
 }
 
-fn show_light(ui: &mut Ui, document: &Document, index: u32, actions: &mut Vec<Action>) {
+/// A colour and its strength; the strength is the largest channel.
+struct StrongColor {
+    of: ColorOf,
+    value: Vec3,
+}
+
+impl StrongColor {
+    fn show(self, ui: &mut Ui, label: &Response, dark: &mut Vec<DarkColor>) -> Option<(Vec3, Gesture)> {
+        let mut strength = self.value.max_element();
+        let remembered = dark.iter().find(|dark| dark.of == self.of).map_or(Vec3::ONE, |dark| dark.color);
+        let color = if strength > 0.0 { self.value / strength } else { remembered };
+        let mut edited = None;
+        ui.horizontal(|ui| {
+            let mut rgb = color.to_array();
+            if ui.color_edit_button_rgb(&mut rgb).labelled_by(label.id).changed() {
+                let strength = if strength > 0.0 { strength } else { 1.0 };
+                edited = Some((Vec3::from_array(rgb) * strength, Gesture::GoesOn));
+            }
+            let speed = f64::from(strength.max(0.1)) * 0.01;
+            let response = ui.add(number_field(&mut strength).range(0.0..=1e6).speed(speed).max_decimals(3));
+            name_field(&response, "Strength".into());
+            if response.changed() {
+                edited = Some((color * strength, gesture(&response)));
+            }
+        });
+        if edited.is_some_and(|(value, _)| value == Vec3::ZERO) {
+            dark.retain(|dark| dark.of != self.of);
+            dark.push(DarkColor { of: self.of, color });
+        }
+        edited
+    }
+}
+
+fn show_light(ui: &mut Ui, document: &Document, index: u32, dark: &mut Vec<DarkColor>, actions: &mut Vec<Action>) {
     let Some(light) = document.version().lights.get(index as usize) else { return };
     let edit = document.edits().lights.get(&index).copied().unwrap_or_default();
     let (kind, unit, size) = match light.kind {
@@ -284,7 +307,8 @@ fn show_light(ui: &mut Ui, document: &Document, index: u32, actions: &mut Vec<Ac
     let mut set = |edit: LightEdit, gesture| actions.push(Action::Edit(Edit::Light(index, edit), gesture));
     Grid::new("light").num_columns(2).spacing([8.0, 4.0]).show(ui, |ui| {
         let label = ui.label(RichText::new("Colour").weak()).on_hover_text(format!("Colour, and strength in {unit}"));
-        if let Some((intensity, gesture)) = strong_color(ui, &label, light.intensity) {
+        let strong = StrongColor { of: (Part::Light(index), "intensity"), value: light.intensity };
+        if let Some((intensity, gesture)) = strong.show(ui, &label, dark) {
             set(LightEdit { intensity: Some(intensity), ..edit }, gesture);
         }
         ui.end_row();
@@ -337,7 +361,8 @@ fn show_environment(ui: &mut Ui, document: &Document, state: &mut PanelState, ac
     Grid::new("environment").num_columns(2).spacing([8.0, 4.0]).show(ui, |ui| match &document.version().environment {
         Environment::Constant(radiance) => {
             let label = ui.label(RichText::new("Radiance").weak());
-            if let Some((radiance, gesture)) = strong_color(ui, &label, *radiance) {
+            let strong = StrongColor { of: (Part::Environment, "radiance"), value: *radiance };
+            if let Some((radiance, gesture)) = strong.show(ui, &label, &mut state.dark) {
                 set(EnvironmentEdit { radiance: Some(radiance), ..edit.clone() }, gesture);
             }
             ui.end_row();
@@ -372,7 +397,8 @@ fn show_environment(ui: &mut Ui, document: &Document, state: &mut PanelState, ac
     if let Backdrop::Color(color) = backdrop {
         ui.horizontal(|ui| {
             let label = ui.label(RichText::new("Backdrop").weak());
-            if let Some((color, gesture)) = strong_color(ui, &label, color) {
+            let strong = StrongColor { of: (Part::Environment, "backdrop"), value: color };
+            if let Some((color, gesture)) = strong.show(ui, &label, &mut state.dark) {
                 set(EnvironmentEdit { backdrop: Some(Backdrop::Color(color)), ..edit }, gesture);
             }
         });

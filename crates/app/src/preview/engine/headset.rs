@@ -167,6 +167,12 @@ impl Worker {
         if self.tracing.follow_head(look, &run.aim())? {
             run.pacing.restart();
         }
+        if self.tracing.begin_trial(look.controls.trial) {
+            // The next one is black.
+            run.panorama = None;
+            self.start_film();
+        }
+        let run = self.headset.as_mut().context("no headset")?;
         let frame = if run.headset.lifecycle().is_running() { Some(run.headset.begin_frame()?) } else { None };
         if let Some(frame) = frame {
             run.draw(frame, look, &mut self.tracing)?;
@@ -270,7 +276,7 @@ impl HeadsetRun {
 
     /// What the fovea goes by, in film space.
     fn gaze(&self) -> (Vec3, GazeFrom) {
-        if let Some(direction) = self.eyes.direction() {
+        if let Some(direction) = self.eyes.direction(Instant::now()) {
             return (direction, GazeFrom::Eyes);
         }
         match self.pointer {

@@ -10,7 +10,7 @@ use crate::preview::engine::{Message, Request};
 use crate::preview::navigation::Navigation;
 use crate::preview::open_scene::OpenScene;
 use crate::preview::unsaved::{Decision, Next};
-use crate::reload::{LoadEvent, Sketchable};
+use crate::reload::{LoadEvent, Sketchable, Watched};
 use crate::session::{Loaded, Source};
 
 impl Window {
@@ -21,16 +21,12 @@ impl Window {
         {
             match event {
                 LoadEvent::Opened(source, loaded) => {
-                    let is_present = self.editor.as_ref().is_some_and(|editor| *editor.source() == source);
-                    if std::mem::take(&mut self.going_back) && is_present {
-                        self.follow_file(&loaded);
-                    } else {
-                        let next = Next::Show(Box::new((source, loaded)));
-                        let allowed = self.unsaved.allow(next, self.editor.as_ref());
-                        allowed.into_iter().for_each(|next| self.go_on(next, rect));
-                    }
+                    let next = Next::Show(Box::new((source, loaded)));
+                    let allowed = self.unsaved.allow(next, self.editor.as_ref());
+                    allowed.into_iter().for_each(|next| self.go_on(next, rect));
                 }
                 LoadEvent::Changed(_) | LoadEvent::Broken(_) if self.going_back => {}
+                LoadEvent::Followed => self.going_back = false,
                 LoadEvent::Changed(loaded) => self.follow_file(&loaded),
                 LoadEvent::Shapes(source, sketchable) if self.editor.is_none() => self.sketch(source, sketchable, rect),
                 // The present scene stays until the next one is there.
@@ -63,9 +59,9 @@ impl Window {
             Some(Decision::GoOn(next)) => self.go_on(next, rect),
             // The loader follows the files of the other scene by now.
             Some(Decision::Stay(Next::Show(_))) => {
-                if let Some(editor) = &self.editor {
+                if let Some(watched) = self.watched.clone() {
                     self.going_back = true;
-                    self.loader.open(editor.source().clone());
+                    self.loader.follow(watched);
                 }
             }
             Some(Decision::Stay(Next::Close | Next::Open(_))) | None => {}
@@ -115,6 +111,7 @@ impl Window {
             }
             self.scene = Some((open, navigation));
             self.editor = Some(Editor::open(source, loaded));
+            self.watched = Some(Watched::new(source, loaded));
         }
     }
 
@@ -138,6 +135,7 @@ impl Window {
             navigation.set_scale(open.diagonal);
             self.camera = self.camera.min(open.viewpoints.len().saturating_sub(1));
             editor.follow_file(loaded);
+            self.watched = Some(Watched::new(editor.source(), loaded));
         }
     }
 }

@@ -26,7 +26,7 @@ impl PupilCapture {
         let epoch = Instant::now();
         let (trace, surface) = (Arc::new(trace), surface.to_owned());
         let publisher = serve(&stop, move |stream, stop| publish(stream, &trace, &surface, epoch, stop));
-        let port = serve(&stop, move |stream, _| remote(stream, publisher, epoch));
+        let port = serve(&stop, move |stream, _| remote(stream, publisher, || clock(epoch)));
         Self { port, stop }
     }
 }
@@ -57,13 +57,14 @@ fn receive(stream: &mut TcpStream, peer: &mut Peer) -> Option<zmtp::Message> {
     }
 }
 
-fn remote(mut stream: TcpStream, publisher: u16, epoch: Instant) {
+/// Pupil Remote, until the client leaves.
+pub fn remote(mut stream: TcpStream, publisher: u16, clock: impl Fn() -> f64) {
     write(&mut stream, &[&zmtp::greeting()[..], &zmtp::ready("REP")].concat());
     let mut peer = Peer::default();
     while let Some(message) = receive(&mut stream, &mut peer) {
         let answer = match message.last().map(Vec::as_slice) {
             Some(b"SUB_PORT") => publisher.to_string(),
-            Some(b"t") => clock(epoch).to_string(),
+            Some(b"t") => clock().to_string(),
             _ => "Unknown command.".into(),
         };
         write(&mut stream, &[zmtp::frame(b"", true), zmtp::frame(answer.as_bytes(), false)].concat());
