@@ -136,6 +136,14 @@ fn gaze_is_listed_watched_and_recorded() {
         numbers
             .map(|line| {
                 line.split(',').map(|field| field.parse::<f64>().unwrap().to_string()).collect::<Vec<_>>().join(",")
+
+    // A film that goes on gets the whole recording again, not what an empty one would have had left of it.
+    let more = ["render", text(&scene), "-o", text(&second), "--resume", text(&first), "--samples", "120000"];
+    assert!(fovea(&[more.as_slice(), &["--gaze-trace", text(&trace)]].concat()).status.success());
+    let both = exr::read(&second).unwrap().film;
+    let left_of_both = (12..20).flat_map(|y| (21..27).map(move |x| y * 64 + x));
+    let left_of_both: f64 = left_of_both.map(|index| f64::from(both.pixel(index).samples)).sum();
+    assert!((left_of_both / left - 2.0).abs() < 0.2, "{left} {left_of_both}");
             })
             .collect()
     };
