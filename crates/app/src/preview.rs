@@ -260,7 +260,10 @@ fn setup(select: AdapterSelect) -> WgpuSetup {
 fn explain(error: eframe::Error) -> anyhow::Error {
     match error {
         eframe::Error::WinitEventLoop(error) => {
-            let cause = session::one_line(&anyhow!("{error}"));
+            let text = session::one_line(&anyhow!("{error}"));
+            // The system's errors begin with a place in the sources of the window's library.
+            let cause =
+                text.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")).map_or(&*text, |(_, rest)| rest);
             anyhow!("no display to open a window on ({cause}); `fovea render` needs none")
         }
         eframe::Error::AppCreation(error) => anyhow!("{error:#}"),

@@ -233,3 +233,4 @@ fn a_missing_display_is_one_line() {
     assert_eq!(output.status.code(), Some(2), "{message}");
     assert!(message.contains("no display") && message.contains("fovea render"), "{message}");
 }
+    assert!(!message.contains(".rs"), "a place in the sources helps nobody: {message}");
