@@ -61,9 +61,10 @@ pub mod window;
 /// No display, no usable adapter, or a scene that cannot be opened.
 pub fn run(args: &PreviewArgs) -> anyhow::Result<()> {
     let source = Source::from(args.scene.scene.as_deref());
-    if let Source::File(path) = &source {
-        // A window that opens only to say that the file is missing helps nobody.
-        std::fs::File::open(path).with_context(|| path.display().to_string())?;
+    // A window that opens only to say that the file is missing helps nobody.
+    match &source {
+        Source::File(path) => drop(std::fs::File::open(path).with_context(|| path.display().to_string())?),
+        Source::BuiltIn => session::check_built_in(&args.scene.file)?,
     }
     let resumed = args.resume.as_deref().map(exr::read).transpose()?;
     let gaze = Arc::new(GazeHub::new(&args.gaze.sources, args.gaze.accuracy_deg)?);

@@ -78,7 +78,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     let prepared = renderer.set_scene(&scene)?;
     renderer.set_pose(pose);
     renderer.set_first_sample(args.first_sample);
-    renderer.set_adaptive(args.sampling.adaptive);
+    renderer.set_adaptive(args.sampling.adaptive == Switch::On);
     let earlier = match resumed.zip(args.resume.as_ref()) {
         Some((file, path)) => Some(resume::restore(&mut renderer, file, path)?),
         None => None,

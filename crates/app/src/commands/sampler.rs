@@ -53,6 +53,7 @@ fn evaluate(args: &SamplerArgs, file: &Path) -> anyhow::Result<()> {
         Evaluated::Rational => Some(InverseForm::Rational),
         Evaluated::Table => Some(InverseForm::Table),
     };
+    anyhow::ensure!(args.inverse != Evaluated::Eq6 || args.floor == 0.0, "--floor: the printed Eq. 6 has none");
     let inverse = form
         .map(|form| Inverse::with_form(&distribution, form.of_sampler(geometry)))
         .transpose()
