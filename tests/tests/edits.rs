@@ -64,7 +64,7 @@ fn a_material_or_a_light_uploads_itself_alone() {
     Arc::make_mut(&mut scene.materials[material]).base_color = Vec3::new(0.9, 0.1, 0.1).extend(1.0);
     let report = edited.set_scene(&scene).unwrap().upload;
     eprintln!("material: {} of {} bytes uploaded", report.uploaded_bytes, report.device_bytes);
-    assert!(report.uploaded_bytes < 1 << 18, "{report:?}");
+    assert!(report.uploaded_bytes < 32 << 10, "{report:?}");
     assert!(report.uploaded_bytes * 10 < report.device_bytes, "{report:?}");
     let after = picture(&mut edited);
     assert_eq!(after.words, picture(&mut renderer(&gpu, &scene)).words, "not the picture of a fresh renderer");
@@ -96,7 +96,7 @@ fn a_move_uploads_the_object_and_places_alone() {
         scene.instances[instance].world_from_mesh.translation += glam::Vec3A::new(0.1, 0.05, 0.0);
         let report = edited.set_scene(&scene).unwrap().upload;
         eprintln!("move {step}: {} of {} bytes uploaded", report.uploaded_bytes, report.device_bytes);
-        assert!(report.uploaded_bytes * 10 < report.device_bytes, "{report:?}");
+        assert!(report.uploaded_bytes < 400 << 10, "{report:?}");
     }
     let moved = picture(&mut edited);
     let mut fresh = renderer(&gpu, &scene);

@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 
 use fovea_tests::{
     device, pencil,
-    scenes::{Builder, emitter, even_image, image, lambert},
+    scenes::{Builder, corner_form_factor, emitter, even_image, image, lambert},
 };
 use glam::{Affine3A, DVec3, Quat, Vec3};
 use tracer::{
@@ -108,16 +108,6 @@ fn closed_furnace_by_every_number_of_bounces() {
         let expected = 0.5 * (1.0 - 0.6f64.powi(bounces as i32 + 1)) / 0.4;
         assert_is(&format!("closed furnace, {bounces} bounces"), value, expected);
     }
-}
-
-/// Form factor from a point to a parallel rectangle whose corner is straight above (Howell's catalogue, B-3).
-fn corner_form_factor(a: f64, b: f64, height: f64) -> f64 {
-    let (a, b) = (a / height, b / height);
-    let part = |p: f64, q: f64| {
-        let root = (1.0 + p * p).sqrt();
-        p / root * (q / root).atan()
-    };
-    (part(a, b) + part(b, a)) / (2.0 * PI)
 }
 
 /// Light sampling, BSDF sampling and both give the closed form within 3 standard errors of at most 0.2 %; both together have

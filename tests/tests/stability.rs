@@ -12,7 +12,7 @@ use fovea_tests::{
     device,
     pencil::{Measured, measure},
     plant::{exchanged, instead_of_paths},
-    scenes::{self, Builder, emitter, lambert},
+    scenes::{self, Builder, corner_form_factor, emitter, lambert},
 };
 use glam::{Affine3A, Mat3A, Quat, Vec3};
 use tracer::{
@@ -106,7 +106,7 @@ fn scales_and_distances_from_the_origin() {
         row(
             &format!("lamp of {:.0e} m over a floor", 2.0 * scale),
             found,
-            0.7 * 3.0 * 4.0 * corner_factor(1.0, 1.0, 1.5),
+            0.7 * 3.0 * 4.0 * corner_form_factor(1.0, 1.0, 1.5),
         );
     }
 }
@@ -143,16 +143,6 @@ fn far_room() -> Vec<u8> {
         bytes,
     ]
     .concat()
-}
-
-/// Form factor from a point to a parallel rectangle whose corner is straight above (Howell's catalogue, B-3).
-fn corner_factor(a: f64, b: f64, height: f64) -> f64 {
-    let (a, b) = (a / height, b / height);
-    let part = |p: f64, q: f64| {
-        let root = (1.0 + p * p).sqrt();
-        p / root * (q / root).atan()
-    };
-    (part(a, b) + part(b, a)) / (2.0 * PI)
 }
 
 /// Random numbers for shapes: a linear congruential generator is good enough, and the same everywhere.
@@ -364,7 +354,7 @@ fn emitters_of_every_strength() {
         builder.build()
     };
     let ray = [Vec3::new(6.0, 1.0, 0.0), Vec3::ZERO];
-    let factor = 0.7 * 4.0 * corner_factor(1.0, 1.0, 1.5);
+    let factor = 0.7 * 4.0 * corner_form_factor(1.0, 1.0, 1.5);
     for (radiance, more) in [(1e-6f32, 0.0), (1.0, 0.0), (1e9, 0.0), (1.0, 1e6)] {
         let found = measure(&gpu, &lit_by(radiance, more), ray, 1, 4 * SAMPLES, |_| {});
         let beside = if more > 0.0 { format!(" beside one of {more:.0e}") } else { String::new() };

@@ -19,7 +19,7 @@ const METHODS: [&str; 7] = ["od", "vp", "vp-region", "fv", "fv-eq6", "fv-clip", 
 
 fn study(folder: &Path, more: &str) -> Result<(), String> {
     let line = format!(
-        "fovea study --film 64x32 --seeds {SEEDS} --spp 1 --reference-spp 2 --max-bounces 1 --gaze 0,0 --gaze 20,-30 {more} --out"
+        "fovea study --film 64x32 --seeds {SEEDS} --spp 4 --reference-spp 2 --max-bounces 1 --gaze 0,0 --gaze 20,-30 {more} --out"
     );
     let words = line.split_whitespace().map(OsString::from).chain([folder.into()]);
     let parsed = cli::parse(words).map_err(|stop| format!("{stop:?}"))?;
@@ -69,6 +69,39 @@ fn other_random_numbers_leave_nothing_of_the_picture_before() {
     assert!(second.1.iter().flatten().all(|value| value.is_finite()));
 }
 
+/// Samples and mean error in the fovea of a method at the first gaze, where at most a fifth of its pixels are empty.
+fn curve(rows: &str, method: &str) -> Vec<(f64, f64)> {
+    let mut lines = rows.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let head = lines.next().unwrap();
+    let column = |name: &str| head.iter().position(|field| *field == name).unwrap();
+    let [samples, error, empty] = ["samples", "film_fovea", "empty"].map(column);
+    let number = |row: &Vec<&str>, column: usize| row[column].parse::<f64>().unwrap_or(f64::NAN);
+    let here: Vec<_> = lines.filter(|row| row[1] == "0_0" && row[2] == method).collect();
+    let (first, second) = here.split_at(here.len() / SEEDS);
+    let mean = |a: &Vec<&str>, b: &Vec<&str>, column| 0.5 * (number(a, column) + number(b, column));
+    let points = first.iter().zip(second).filter(|(a, b)| mean(a, b, empty) <= 0.2 && mean(a, b, error).is_finite());
+    points.map(|(a, b)| (number(a, samples), mean(a, b, error))).collect()
+}
+
+/// Samples at which a falling curve first has an error, between logarithms.
+fn samples_at(curve: &[(f64, f64)], error: f64) -> Option<f64> {
+    curve.windows(2).find_map(|pair| {
+        let [(n0, e0), (n1, e1)] = [pair[0], pair[1]];
+        let is_within = e0 >= error && error >= e1 && e1 > 0.0 && e0 > e1;
+        is_within.then(|| n0 * (n1 / n0).powf((e0 / error).ln() / (e0 / e1).ln()))
+    })
+}
+
+/// Median over the rounds at the first gaze.
+fn seconds_a_sample(rates: &str, method: &str) -> f64 {
+    let rows = rates.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let here = rows.filter(|row| row[1] == "0_0" && row[2] == method);
+    let mut all: Vec<f64> = here.map(|row| row[5].parse::<f64>().unwrap() / row[4].parse::<f64>().unwrap()).collect();
+    all.sort_by(f64::total_cmp);
+    assert_eq!(all.len() % 2, 1, "a middle one");
+    all[all.len() / 2]
+}
+
 #[test]
 fn a_small_study_leaves_all_its_outputs_and_goes_on_from_them() {
     let folder = scratch();
@@ -96,6 +129,23 @@ fn a_small_study_leaves_all_its_outputs_and_goes_on_from_them() {
     let summary: Value = serde_json::from_str(&std::fs::read_to_string(folder.join("study.json")).unwrap()).unwrap();
     assert_eq!(summary["sights"].as_array().unwrap().len(), 2);
     assert_eq!(summary["settings"]["builtin"]["film"], serde_json::json!([64, 32]));
+
+    // One ratio of the summary, from the raw rows.
+    let found = &summary["sights"][0]["ratios"]["fv_over_od"];
+    assert_eq!(summary["sights"][0]["gaze"], "0_0");
+    let (od, fv) = (curve(&rows, "od"), curve(&rows, "fv"));
+    let from_od = od.iter().filter_map(|&(n, e)| Some((n / samples_at(&fv, e)?).ln()));
+    let from_fv = fv.iter().filter_map(|&(n, e)| Some((samples_at(&od, e)? / n).ln()));
+    let logs: Vec<f64> = from_od.chain(from_fv).collect();
+    let samples = (logs.iter().sum::<f64>() / logs.len() as f64).exp();
+    let rates = std::fs::read_to_string(folder.join("rates.csv")).unwrap();
+    let rate = seconds_a_sample(&rates, "od") / seconds_a_sample(&rates, "fv");
+    let near = |found: &Value, expected: f64| {
+        assert!((found.as_f64().unwrap() / expected - 1.0).abs() < 1e-9, "{found} instead of {expected}");
+    };
+    near(&found["samples"]["value"], samples);
+    near(&found["rate"], rate);
+    near(&found["time"], samples * rate);
 
     // A lost run is rendered again to the same bytes, the others are left.
     let lost = folder.join("runs").join("builtin_0_0_fv_2.csv");

@@ -231,7 +231,7 @@ pub struct SceneArgs {
     pub env: Option<PathBuf>,
     /// Turns the environment image to the right, degrees
     #[arg(
-        long, allow_negative_numbers = true, default_value_t = 0.0, requires = "env",
+        long, allow_negative_numbers = true, default_value_t = 0.0, requires = "env", conflicts_with = "background",
         value_parser = values::finite, value_name = "DEG"
     )]
     pub env_rotate: f32,
@@ -309,9 +309,12 @@ pub struct SamplingArgs {
     #[arg(long, value_enum, default_value_t = ScheduleChoice::Auto, value_name = "SCHEDULE")]
     pub schedule: ScheduleChoice,
     /// More samples to where the film is visibly noisy, fewer to the rest (a quarter at least): clean sooner about the gaze, with a
-    /// slight bias that the film's header admits
-    #[arg(long)]
-    pub adaptive: bool,
+    /// slight bias that the film's header admits; without a switch it is on
+    #[arg(
+        long, value_enum, default_value_t = Switch::Off, num_args = 0..=1, require_equals = true,
+        default_missing_value = "on", value_name = "SWITCH"
+    )]
+    pub adaptive: Switch,
 }
 
 impl SamplingArgs {
@@ -390,8 +393,20 @@ pub fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Cli, Stop>
     })
 }
 
+/// What can be asked for. Options that the window keeps have no fixed default there.
+fn command() -> clap::Command {
+    KEPT_OPTIONS.into_iter().fold(Cli::command(), |command, id| {
+        command.mut_arg(id, |option| {
+            let usual: Vec<_> = option.get_default_values().iter().map(|value| value.to_string_lossy()).collect();
+            let usual = usual.join(",");
+            let help = option.get_help().map(ToString::to_string).unwrap_or_default();
+            option.hide_default_value(true).help(format!("{help} [default: as last left, else {usual}]"))
+        })
+    })
+}
+
 fn try_parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Cli, clap::Error> {
-    let mut command = Cli::command();
+    let mut command = command();
     let matches = command.try_get_matches_from_mut(arguments)?;
     let mut cli = Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
     if let (Some(Command::Render(args)), Some(matches)) = (&mut cli.command, matches.subcommand_matches("render")) {

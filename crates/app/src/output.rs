@@ -71,13 +71,11 @@ impl ImageFormat {
 /// Finds out, before the work is done, whether `path` could be written. Leaves nothing behind.
 pub fn check_writable(path: &Path) -> Result<(), OutputError> {
     let unwritable = |reason: String| OutputError::Unwritable { path: path.to_owned(), reason };
-    if path.is_dir() {
-        return Err(unwritable("it is a folder".into()));
-    }
-    if path.metadata().is_ok_and(|metadata| metadata.permissions().readonly()) {
+    let target = target(path)?;
+    if target.metadata().is_ok_and(|metadata| metadata.permissions().readonly()) {
         return Err(unwritable("the existing file is read-only".into()));
     }
-    let beside = beside(path)?;
+    let beside = beside(&target);
     File::create_new(&beside).map_err(|error| unwritable(error.to_string()))?;
     std::fs::remove_file(&beside).map_err(|error| unwritable(error.to_string()))
 }
@@ -88,14 +86,15 @@ pub fn write_atomically(
     write: impl FnOnce(&mut BufWriter<File>) -> Result<(), String>,
 ) -> Result<(), OutputError> {
     let unwritable = |reason: String| OutputError::Unwritable { path: path.to_owned(), reason };
-    let beside = beside(path)?;
+    let target = target(path)?;
+    let beside = beside(&target);
     let file = File::create_new(&beside).map_err(|error| unwritable(error.to_string()))?;
     let mut writer = BufWriter::new(file);
     let written = write(&mut writer)
         .and_then(|()| writer.flush().map_err(|error| error.to_string()))
         .and_then(|()| writer.get_ref().sync_all().map_err(|error| error.to_string()));
     drop(writer);
-    written.and_then(|()| std::fs::rename(&beside, path).map_err(|error| error.to_string())).map_err(|reason| {
+    written.and_then(|()| std::fs::rename(&beside, &target).map_err(|error| error.to_string())).map_err(|reason| {
         // The first error is the one to report; a leftover that cannot be removed either is named nowhere else.
         let _ = std::fs::remove_file(&beside);
         unwritable(reason)
@@ -117,16 +116,41 @@ pub fn free_names<const N: usize>(folder: &Path, scene: &str, extensions: [&str;
     (1..).map(names).find(|names| !names.iter().any(|path| path.exists())).unwrap_or_else(|| names(0))
 }
 
+/// Writes a text as [`write_atomically`] does.
+///
+/// # Errors
+/// When the file cannot be written.
+pub fn write_text(path: &Path, text: &str) -> Result<(), OutputError> {
+    write_atomically(path, |writer| writer.write_all(text.as_bytes()).map_err(|error| error.to_string()))
+}
+
+/// The file that is to be replaced: a link stays, and what it leads to is written. Folders are refused, and so are devices and
+/// pipes, whose place a file would take.
+fn target(path: &Path) -> Result<PathBuf, OutputError> {
+    let unwritable = |reason: String| OutputError::Unwritable { path: path.to_owned(), reason };
+    if path.file_name().is_none() {
+        return Err(unwritable("it names no file".into()));
+    }
+    if path.to_string_lossy().ends_with(std::path::is_separator) || path.is_dir() {
+        return Err(unwritable("it is a folder".into()));
+    }
+    if path.metadata().is_ok_and(|metadata| !metadata.is_file()) {
+        return Err(unwritable("it is a device or pipe".into()));
+    }
+    // A link that leads nowhere is replaced.
+    if path.is_symlink() && path.exists() {
+        return path.canonicalize().map_err(|error| unwritable(error.to_string()));
+    }
+    Ok(path.to_owned())
+}
+
 /// A name in the same folder that no other write uses, of this process or another.
-fn beside(path: &Path) -> Result<PathBuf, OutputError> {
+fn beside(path: &Path) -> PathBuf {
     static WRITES: AtomicU64 = AtomicU64::new(0);
-    let name = path
-        .file_name()
-        .ok_or_else(|| OutputError::Unwritable { path: path.to_owned(), reason: "it names no file".into() })?;
     let mut hidden = std::ffi::OsString::from(".");
-    hidden.push(name);
+    hidden.push(path.file_name().unwrap_or_default());
     hidden.push(format!(".{}-{}.part", std::process::id(), WRITES.fetch_add(1, Ordering::Relaxed)));
-    Ok(path.with_file_name(hidden))
+    path.with_file_name(hidden)
 }
 
 #[cfg(test)]
@@ -200,8 +224,30 @@ mod tests {
         let message = check_writable(&missing).unwrap_err().to_string();
         assert!(message.contains("no such folder") && !message.contains('\n'), "{message}");
         assert!(check_writable(&folder).unwrap_err().to_string().contains("folder"));
+        let trailing = PathBuf::from(format!("{}/", folder.join("image.exr").display()));
+        assert!(check_writable(&trailing).unwrap_err().to_string().contains("folder"));
         assert!(check_writable(&folder.join("image.exr")).is_ok());
         assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 0);
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn links_stay_and_devices_are_refused() {
+        let folder = scratch("links");
+        let (link, film) = (folder.join("latest.exr"), folder.join("film.exr"));
+        std::os::unix::fs::symlink("film.exr", &link).unwrap();
+        std::fs::write(&film, "old").unwrap();
+        check_writable(&link).unwrap();
+        write_text(&link, "new").unwrap();
+        assert!(link.is_symlink());
+        assert_eq!(std::fs::read_to_string(&film).unwrap(), "new");
+        let device = folder.join("null.exr");
+        std::os::unix::fs::symlink("/dev/null", &device).unwrap();
+        for path in [&device, Path::new("/dev/null")] {
+            assert!(check_writable(path).unwrap_err().to_string().contains("device"));
+        }
+        assert!(write_text(&device, "").is_err());
         std::fs::remove_dir_all(folder).unwrap();
     }
 }

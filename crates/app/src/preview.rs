@@ -61,9 +61,10 @@ pub mod window;
 /// No display, no usable adapter, or a scene that cannot be opened.
 pub fn run(args: &PreviewArgs) -> anyhow::Result<()> {
     let source = Source::from(args.scene.scene.as_deref());
-    if let Source::File(path) = &source {
-        // A window that opens only to say that the file is missing helps nobody.
-        std::fs::File::open(path).with_context(|| path.display().to_string())?;
+    // A window that opens only to say that the file is missing helps nobody.
+    match &source {
+        Source::File(path) => drop(std::fs::File::open(path).with_context(|| path.display().to_string())?),
+        Source::BuiltIn => session::check_built_in(&args.scene.file)?,
     }
     let resumed = args.resume.as_deref().map(exr::read).transpose()?;
     let gaze = Arc::new(GazeHub::new(&args.gaze.sources, args.gaze.accuracy_deg)?);
@@ -260,7 +261,10 @@ fn setup(select: AdapterSelect) -> WgpuSetup {
 fn explain(error: eframe::Error) -> anyhow::Error {
     match error {
         eframe::Error::WinitEventLoop(error) => {
-            let cause = session::one_line(&anyhow!("{error}"));
+            let text = session::one_line(&anyhow!("{error}"));
+            // The system's errors begin with a place in the sources of the window's library.
+            let cause =
+                text.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")).map_or(&*text, |(_, rest)| rest);
             anyhow!("no display to open a window on ({cause}); `fovea render` needs none")
         }
         eframe::Error::AppCreation(error) => anyhow!("{error:#}"),

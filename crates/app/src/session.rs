@@ -154,6 +154,22 @@ pub fn import(source: &Source, args: &FileArgs) -> anyhow::Result<(Scene, Import
     import_showing(source, args, |_| ())
 }
 
+/// What of a file is shown says nothing of the built-in scene.
+///
+/// # Errors
+/// When something of a file was asked for; the option is named.
+pub fn check_built_in(args: &FileArgs) -> anyhow::Result<()> {
+    let asked = [
+        ("--gltf-scene", args.gltf_scene.is_some()),
+        ("--time", args.time.is_some()),
+        ("--variant", args.variant.is_some()),
+    ];
+    match asked.into_iter().find(|(_, is_asked)| *is_asked) {
+        Some((option, _)) => bail!("{option} is for a glTF file, and the built-in scene is none"),
+        None => Ok(()),
+    }
+}
+
 fn import_showing(
     source: &Source,
     args: &FileArgs,
@@ -162,6 +178,7 @@ fn import_showing(
     let options = ImportOptions { scene: args.gltf_scene, time_secs: args.time, variant: args.variant.clone() };
     match source {
         Source::BuiltIn => {
+            check_built_in(args)?;
             let (scene, report) = tracer::builtin::scene().context("the built-in scene")?;
             shapes(&scene);
             Ok((scene, report))

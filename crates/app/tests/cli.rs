@@ -38,6 +38,24 @@ fn bad_input_is_refused_in_one_line_and_no_file_is_touched() {
     refuses(&["render", scene, "-o", text(&folder.path("no/such/folder/out.png"))], &["out.png", "cannot be written"]);
     refuses(&["render", scene], &["--output"]);
     refuses(&["info", text(&missing)], &["missing.glb"]);
+    for (option, value) in [("--time", "1"), ("--variant", "beach"), ("--gltf-scene", "0")] {
+        refuses(&["render", "-o", out, option, value], &[option, "built-in"]);
+        refuses(&["info", option, value], &[option, "built-in"]);
+        refuses(&[option, value], &[option, "built-in"]);
+    }
+    refuses(&["render", scene, "-o", &format!("{out}/")], &["out.exr/", "folder"]);
+    let study = folder.path("study");
+    refuses(&["study", scene, text(&missing), "--film", "16x8", "-o", text(&study)], &["missing.glb"]);
+    refuses(&["study", "--only", "report", "-o", text(&study)], &["study", "cannot be read"]);
+    let numbers = folder.path("numbers.csv");
+    std::fs::write(&numbers, "u\n0.5\nhalf\n").unwrap();
+    let eval = ["sampler", "--eval", text(&numbers)];
+    refuses(&eval, &["numbers.csv: line 3: `half`"]);
+    std::fs::write(&numbers, "0.5\n").unwrap();
+    let eq6 = ["--geometry", "plane", "--inverse", "eq6"];
+    refuses(&[eval.as_slice(), &eq6, &["--floor", "0.002"]].concat(), &["--floor", "Eq. 6"]);
+    assert!(fovea(&[eval.as_slice(), &eq6].concat()).status.success());
+    std::fs::remove_file(numbers).unwrap();
     refuses(&["render", scene, "-o", out, "--gaze-trace", text(&broken)], &["broken.glb", "gaze-trace v1"]);
     refuses(&["render", scene, "-o", out, "--gaze-trace", scene, "--mode", "od"], &["--gaze-trace", "--mode fv"]);
     refuses(&["--gaze", "trace:missing.csv"], &["missing.csv"]);
@@ -118,6 +136,14 @@ fn a_render_follows_a_recorded_gaze_and_is_the_same_every_time() {
     assert!(left > 1.5 * centre, "{left} {centre} {right}");
     render(text(&second));
     assert_eq!(std::fs::read(&first).unwrap(), std::fs::read(&second).unwrap());
+
+    // A film that goes on gets the whole recording again, not what an empty one would have had left of it.
+    let more = ["render", text(&scene), "-o", text(&second), "--resume", text(&first), "--samples", "120000"];
+    assert!(fovea(&[more.as_slice(), &["--gaze-trace", text(&trace)]].concat()).status.success());
+    let both = exr::read(&second).unwrap().film;
+    let left_of_both = (12..20).flat_map(|y| (21..27).map(move |x| y * 64 + x));
+    let left_of_both: f64 = left_of_both.map(|index| f64::from(both.pixel(index).samples)).sum();
+    assert!((left_of_both / left - 2.0).abs() < 0.2, "{left} {left_of_both}");
 }
 
 #[test]
@@ -224,4 +250,5 @@ fn a_missing_display_is_one_line() {
     let message = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2), "{message}");
     assert!(message.contains("no display") && message.contains("fovea render"), "{message}");
+    assert!(!message.contains(".rs"), "a place in the sources helps nobody: {message}");
 }

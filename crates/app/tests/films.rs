@@ -120,11 +120,12 @@ fn what_does_not_belong_together_is_refused_and_nothing_is_written() {
         let line = ["render", text(&scene), "--resume", text(&film), "-o", text(&out), "--samples", "600"];
         refuses(&[line.as_slice(), options].concat(), parts);
     };
-    resume(&["--seed", "2"], &["--seed is 2", "has 1"]);
-    resume(&["--max-bounces", "8"], &["--max-bounces is 8", "has 2"]);
-    resume(&["--film", "perspective:32x16"], &["--film"]);
-    resume(&["--orient", "camera"], &["--orient"]);
-    resume(&["--sequence", "independent"], &["--sequence"]);
+    resume(&["--seed", "2"], &["--seed is 2", "with is 1"]);
+    resume(&["--max-bounces", "8"], &["--max-bounces is 8", "with is 2"]);
+    resume(&["--film", "perspective:32x16"], &["--film is perspective:32x16 of", "with is equirect:32x16"]);
+    // Twice the arc sine of 0.6.
+    resume(&["--orient", "camera"], &["--orient is camera", "with is 73.7 degrees from it"]);
+    resume(&["--sequence", "independent"], &["--sequence is independent", "with is sobol"]);
     resume(&["--background", "0,0,1"], &["film.exr", "turned.gltf", "scene"]);
     resume(&["--first-sample", "7"], &["--first-sample"]);
     assert_eq!(bytes(&out), b"precious");

@@ -47,8 +47,8 @@ pub enum SamplerError {
     /// The inverse asked for exists only for another distribution.
     #[error("{0}")]
     Unsupported(&'static str),
-    /// A tabulated model's text could not be read.
-    #[error("acuity table, line {line}: {problem}")]
+    /// A text of numbers could not be read: a tabulated model, or where to evaluate one.
+    #[error("line {line}: {problem}")]
     Table {
         /// 1-based line number.
         line: usize,

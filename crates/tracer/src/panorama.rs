@@ -155,11 +155,6 @@ impl Panorama {
         film.mapping == FilmMapping::Equirect && self.size == [film.width, film.height]
     }
 
-    /// Texels that a whole refresh passes over.
-    pub fn refresh_texels(&self) -> u64 {
-        self.steps.iter().map(|step| self.step_texels(step)).sum()
-    }
-
     pub(crate) fn step_texels(&self, step: &Step) -> u64 {
         u64::from(level_size(self.size, step.level)[0]) * u64::from(step.rows)
     }

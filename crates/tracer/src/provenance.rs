@@ -1,6 +1,6 @@
 //! Where a measurement was made: what goes with every number of a report or a bench.
 
-use std::{fmt, process::Command};
+use std::{fmt, path::Path, process::Command, time::SystemTime};
 
 use crate::gpu::Gpu;
 
@@ -11,7 +11,7 @@ pub struct Provenance {
     pub machine: String,
     /// Graphics adapter, backend and driver, or why there is none.
     pub adapter: String,
-    /// Revision of the source tree that the program is run in, and whether it has changes.
+    /// Revision of the source tree that the program was built from, and whether it has changes.
     pub commit: String,
 }
 
@@ -27,7 +27,7 @@ impl Provenance {
     /// Of this process, measuring on the CPU alone; `reason` says why there is no adapter.
     #[must_use]
     pub fn without_gpu(reason: &str) -> Self {
-        Self { machine: machine(), adapter: reason.to_owned(), commit: commit() }
+        Self { machine: machine(), adapter: reason.to_owned(), commit: commit(Path::new(env!("CARGO_MANIFEST_DIR"))) }
     }
 
     /// Names and values, for JSON.
@@ -58,16 +58,31 @@ fn machine() -> String {
     format!("{cpu}, {threads} threads, {}, {profile}", std::env::consts::OS)
 }
 
-fn commit() -> String {
+/// Revision of a crate's sources, where they still are: a revision within the program would build all that is here anew for each
+/// commit.
+fn commit(sources: &Path) -> String {
     let git = |arguments: &[&str]| {
-        let output = Command::new("git").args(arguments).output().ok()?;
+        let output = Command::new("git").arg("-C").arg(sources).args(arguments).output().ok()?;
         output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
     };
-    match (git(&["rev-parse", "--short=12", "HEAD"]), git(&["status", "--porcelain", "--untracked-files=no"])) {
-        (Some(head), Some(changes)) if changes.is_empty() => head,
-        (Some(head), _) => format!("{head} with changes"),
-        (None, _) => "unknown (not run in a git checkout)".into(),
+    // Sources that somebody unpacked within a repository of his own are none of its files.
+    let head =
+        git(&["ls-files", "--error-unmatch", "Cargo.toml"]).and_then(|_| git(&["rev-parse", "--short=12", "HEAD"]));
+    let Some(head) = head else { return "unknown (the sources' git checkout is not here)".into() };
+    let committed = git(&["log", "-1", "--format=%ct"]).and_then(|text| text.parse().ok()).unwrap_or(0);
+    let is_older = built_secs().is_some_and(|built| built < committed);
+    let is_changed = git(&["status", "--porcelain", "--untracked-files=no"]).is_none_or(|changes| !changes.is_empty());
+    match (is_older, is_changed) {
+        (true, _) => format!("{head} or one before it"),
+        (false, true) => format!("{head} with changes"),
+        (false, false) => head,
     }
+}
+
+/// When this program was built, seconds since 1970.
+fn built_secs() -> Option<u64> {
+    let written = std::env::current_exe().ok()?.metadata().ok()?.modified().ok()?;
+    Some(written.duration_since(SystemTime::UNIX_EPOCH).ok()?.as_secs())
 }
 
 #[cfg(test)]
@@ -81,5 +96,35 @@ mod tests {
             assert!(!value.is_empty(), "{name}");
             assert!(provenance.to_string().contains(value), "{provenance}");
         }
+    }
+
+    #[test]
+    fn the_commit_is_that_of_the_sources() -> std::io::Result<()> {
+        let folder = std::env::temp_dir().join(format!("fovea-commit-{}", std::process::id()));
+        std::fs::create_dir_all(&folder)?;
+        std::fs::write(folder.join("Cargo.toml"), "")?;
+        let git = |words: &str, date: &str| {
+            let mut command = Command::new("git");
+            command.arg("-C").arg(&folder).args(["-c", "user.name=a", "-c", "user.email=a@b"]);
+            let output = command.args(words.split(' ')).env("GIT_COMMITTER_DATE", date).output();
+            output.map(|output| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+        };
+        let is_unknown = |commit: String| assert!(commit.starts_with("unknown"), "{commit}");
+        is_unknown(commit(&folder));
+        // Long before this test was built, and long after.
+        let (before, after) = ("2001-01-01T00:00:00Z", "2099-01-01T00:00:00Z");
+        git("init --quiet", before)?;
+        git("commit --quiet --allow-empty -m a", before)?;
+        is_unknown(commit(&folder));
+        git("add Cargo.toml", before)?;
+        git("commit --quiet -m a", before)?;
+        let old = git("rev-parse --short=12 HEAD", before)?;
+        assert_eq!(commit(&folder), old);
+        std::fs::write(folder.join("Cargo.toml"), "changed")?;
+        assert_eq!(commit(&folder), format!("{old} with changes"));
+        git("commit --quiet --amend -m b", after)?;
+        let new = git("rev-parse --short=12 HEAD", after)?;
+        assert_eq!(commit(&folder), format!("{new} or one before it"));
+        std::fs::remove_dir_all(folder)
     }
 }

@@ -232,8 +232,6 @@ pub struct Material {
     pub normal_texture: Option<TextureRef>,
     /// Scales x and y of the normal map.
     pub normal_scale: f32,
-    /// Kept for reports: a path tracer computes occlusion itself.
-    pub occlusion_texture: Option<TextureRef>,
     /// Emitted radiance, linear Rec. 709, `emissive_strength` multiplied in.
     pub emission: Vec3,
     /// RGB, sRGB.
@@ -323,7 +321,6 @@ impl Default for Material {
             metallic_roughness_texture: None,
             normal_texture: None,
             normal_scale: 1.0,
-            occlusion_texture: None,
             emission: Vec3::ZERO,
             emissive_texture: None,
             alpha_mode: AlphaMode::Opaque,

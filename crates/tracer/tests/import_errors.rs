@@ -225,6 +225,36 @@ fn absurd_images_are_refused_and_missing_ones_replaced() {
 }
 
 #[test]
+#[cfg(unix)]
+fn pipes_and_devices_are_not_read() {
+    let folder = std::env::temp_dir().join(format!("fovea-pipes-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    // Nobody writes to it: whoever opens it waits for ever.
+    assert!(std::process::Command::new("mkfifo").arg(folder.join("pipe")).status().unwrap().success());
+    let to_root = "../".repeat(folder.components().count());
+    let load = |file: &File| {
+        let path = folder.join("scene.glb");
+        std::fs::write(&path, file.glb()).unwrap();
+        load_gltf(&path, &ImportOptions::default())
+    };
+    let endless = format!("{to_root}dev/zero");
+    for (uri, cause) in [("pipe", "no regular file"), (&endless, "no regular file"), ("/dev/zero", "relative")] {
+        let mut file = File::triangle();
+        file.push("buffers", json!({"uri": uri, "byteLength": 4}));
+        let message = load(&file).map(|(scene, _)| scene.name).unwrap_err().to_string();
+        assert!(message.contains("cannot be read") && message.contains(cause), "{uri}: {message}");
+        let mut file = File::triangle().with_uvs();
+        file.push("images", json!({"uri": uri}));
+        file.push("textures", json!({"source": 0}));
+        file.material(json!({"normalTexture": {"index": 0}}));
+        let (_, report) = load(&file).unwrap();
+        let said = report.warnings.iter().find(|w| matches!(w, ImportWarning::ImageReplaced { .. })).unwrap();
+        assert!(said.to_string().contains(cause), "{uri}: {said}");
+    }
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
 fn a_missing_emissive_texture_gives_no_light() {
     let mut file = File::triangle().with_uvs();
     file.push("images", json!({"uri": "gone.png"}));

@@ -1,7 +1,6 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use super::*;
-use clap::CommandFactory;
 
 fn read(line: &str) -> Result<Cli, Stop> {
     parse(line.split(' ').map(OsString::from))
@@ -23,7 +22,7 @@ fn complaint(line: &str) -> String {
 
 #[test]
 fn the_command_line_is_consistent() {
-    Cli::command().debug_assert();
+    command().debug_assert();
 }
 
 #[test]
@@ -97,6 +96,7 @@ fn wrong_values_are_refused_in_one_line_that_names_the_option_and_the_cause() {
         ("fovea render a.glb", "--output", "required"),
         ("fovea render -o a.exr --spp 1 --seconds 1", "--spp", "cannot be used"),
         ("fovea render -o a.exr --env a.hdr --background 1,1,1", "--env", "cannot be used"),
+        ("fovea render -o a.exr --env-rotate 9 --background 1,1,1", "--env-rotate", "cannot be used"),
         ("fovea render -o a.exr --gaze 1,2 --gaze-trace a.csv", "--gaze", "cannot be used"),
         ("fovea render -o a.exr --gaze-trace a.csv --seconds 1", "--seconds", "cannot be used"),
         ("fovea --gaze moose", "--gaze", "mouse-dwell"),
@@ -110,6 +110,34 @@ fn wrong_values_are_refused_in_one_line_that_names_the_option_and_the_cause() {
         assert!(message.contains(option) && message.contains(cause), "{line}: {message}");
         assert!(!message.contains('\n'), "{message}");
     }
+}
+
+#[test]
+fn adaptive_sampling_can_be_switched_both_ways() {
+    for (line, adaptive) in [
+        ("-o a.exr", Switch::Off),
+        ("--adaptive -o a.exr", Switch::On),
+        ("--adaptive room.glb -o a.exr", Switch::On),
+        ("--adaptive=on -o a.exr", Switch::On),
+        ("--adaptive=off -o a.exr", Switch::Off),
+    ] {
+        assert_eq!(render(line).sampling.adaptive, adaptive, "{line}");
+    }
+    assert_eq!(read("fovea --adaptive=off").unwrap().preview.stated, ["adaptive"]);
+}
+
+#[test]
+fn the_windows_help_says_what_it_keeps() {
+    let help = |line: &str| match read(line) {
+        Err(Stop::Asked(text)) => text.split_whitespace().collect::<Vec<_>>().join(" "),
+        other => panic!("{other:?}"),
+    };
+    let (window, render) = (help("fovea --help"), help("fovea render --help"));
+    for usual in ["fv", "off", "0", "agx", "on", "1280x720"] {
+        assert!(window.contains(&format!("[default: as last left, else {usual}]")), "{usual}: {window}");
+    }
+    assert!(!window.contains("[default: fv]") && render.contains("[default: fv]"));
+    assert!(!render.contains("as last left"));
 }
 
 #[test]

@@ -3,11 +3,10 @@
 //! What is compared takes turns in one run, and medians count. Raw numbers of every scene and part go to one file, from which
 //! the report is made.
 
-use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::Context;
+use anyhow::{Context, bail, ensure};
 use glam::Vec3;
 use serde_json::{Value, json};
 use tracer::gpu::{AdapterSelect, Gpu};
@@ -15,7 +14,7 @@ use tracer::provenance::Provenance;
 
 use crate::cli::bench::{BenchArgs, Part};
 use crate::commands::print_text;
-use crate::output::{check_writable, write_atomically};
+use crate::output::{check_writable, write_text};
 use crate::process;
 use subject::Subject;
 
@@ -42,9 +41,16 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<()> {
         check_writable(path)?;
     }
     let mut kept = args.json.as_deref().map_or_else(|| Ok(empty()), read)?;
+    let notes = args.json.as_deref().map_or_else(|| Ok(String::new()), notes)?;
     if args.parts().contains(&Part::Report) {
-        let folder = args.report.as_deref().context("--only report needs --report")?;
-        return page::write(folder, &kept);
+        ensure!(args.parts().len() == 1, "--only report measures nothing and takes no other part");
+        let (Some(folder), Some(file)) = (&args.report, &args.json) else { bail!("--only report needs --report") };
+        ensure!(kept != empty(), "{}: holds no measurement", file.display());
+        page::check(folder)?;
+        return page::write(folder, &kept, &notes);
+    }
+    if let Some(folder) = &args.report {
+        page::check(folder)?;
     }
     if cfg!(debug_assertions) && args.parts().contains(&Part::Rays) {
         eprintln!("obvhs on the CPU is slower in this build than in one for release, the device is not");
@@ -74,14 +80,14 @@ pub fn run(args: &BenchArgs) -> anyhow::Result<()> {
         here[part.name()] = found.clone();
         kept["scenes"][&subject.name][part.name()] = found;
     }
-    print_text(&page::text(&json!({ "scenes": { subject.name.as_str(): here } })))?;
     if let Some(path) = &args.json {
-        write(path, &format!("{kept:#}\n"))?;
+        write_text(path, &format!("{kept:#}\n"))?;
     }
     if let Some(folder) = &args.report {
-        page::write(folder, &kept)?;
+        page::write(folder, &kept, &notes)?;
     }
-    Ok(())
+    // A reader that is gone loses nothing that was measured.
+    print_text(&page::text(&json!({ "scenes": { subject.name.as_str(): here } })))
 }
 
 fn empty() -> Value {
@@ -96,12 +102,19 @@ fn read(path: &Path) -> anyhow::Result<Value> {
         Err(error) => return Err(error).with_context(|| path.display().to_string()),
     };
     let raw: Value = serde_json::from_str(&text).with_context(|| path.display().to_string())?;
-    anyhow::ensure!(raw["scenes"].is_object(), "{} is no file of fovea bench", path.display());
+    let holds_objects = |value: &Value| value.as_object().is_some_and(|all| all.values().all(Value::is_object));
+    let is_bench = raw["scenes"].as_object().is_some_and(|scenes| scenes.values().all(holds_objects));
+    ensure!(is_bench, "{} is no file of fovea bench", path.display());
     Ok(raw)
 }
 
-fn write(path: &Path, text: &str) -> anyhow::Result<()> {
-    Ok(write_atomically(path, |writer| writer.write_all(text.as_bytes()).map_err(|error| error.to_string()))?)
+/// What the one who measures has to say, in a file beside the raw numbers: `speed.notes.md` for `speed.json`.
+fn notes(json: &Path) -> anyhow::Result<String> {
+    let path = json.with_extension("notes.md");
+    match std::fs::read_to_string(&path) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(String::new()),
+        text => text.with_context(|| path.display().to_string()),
+    }
 }
 
 /// A number, or null where it is none.

@@ -66,7 +66,10 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     }
     let aim = aim(args, &film, pose.world_from_film)?;
     let steps = match &args.gaze_trace {
-        Some(path) => follow::steps(path, args, &aim.view, samples(&args.stop, &film))?,
+        Some(path) => {
+            let held = resumed.as_ref().map_or(0, |file| file.film.header.statistics.samples);
+            follow::steps(path, args, &aim.view, held..samples(&args.stop, &film))?
+        }
         None => Vec::new(),
     };
     let inverse = args.sampling.acuity().inverse()?;
@@ -75,7 +78,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     let prepared = renderer.set_scene(&scene)?;
     renderer.set_pose(pose);
     renderer.set_first_sample(args.first_sample);
-    renderer.set_adaptive(args.sampling.adaptive);
+    renderer.set_adaptive(args.sampling.adaptive == Switch::On);
     let earlier = match resumed.zip(args.resume.as_ref()) {
         Some((file, path)) => Some(resume::restore(&mut renderer, file, path)?),
         None => None,

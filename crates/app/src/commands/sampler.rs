@@ -19,7 +19,7 @@ use tracer::{
 use super::print_text;
 use crate::cli::choices::{self, InverseForm};
 use crate::cli::sampler::{Evaluated, SamplerArgs};
-use crate::output::{png, write_atomically};
+use crate::output::{png, write_text};
 
 /// Numbers at which errors are measured: every one that a shader can draw.
 const MEASURED: u32 = 1 << 24;
@@ -53,6 +53,7 @@ fn evaluate(args: &SamplerArgs, file: &Path) -> anyhow::Result<()> {
         Evaluated::Rational => Some(InverseForm::Rational),
         Evaluated::Table => Some(InverseForm::Table),
     };
+    anyhow::ensure!(args.inverse != Evaluated::Eq6 || args.floor == 0.0, "--floor: the printed Eq. 6 has none");
     let inverse = form
         .map(|form| Inverse::with_form(&distribution, form.of_sampler(geometry)))
         .transpose()
@@ -105,12 +106,13 @@ fn compare(args: &SamplerArgs) -> anyhow::Result<()> {
     if let Some(launches) = &launches {
         text.push_str(&launches.text(&entries));
     }
-    print_text(&text)?;
     let chart = Chart::error_against_cost(&entries, &provenance);
     write_text(&args.output.join("sampler.csv"), &report::csv(&entries, &provenance))?;
     write_text(&args.output.join("sampler.svg"), &chart.svg())?;
     let ([width, height], texels) = raster::draw(&chart);
     png::write(&args.output.join("sampler.png"), width, height, &texels)?;
+    // A reader that is gone loses nothing that was measured.
+    print_text(&text)?;
     print_text(&format!("wrote sampler.csv, sampler.svg and sampler.png to {}\n", args.output.display()))
 }
 
@@ -120,9 +122,4 @@ fn gpu(name: Option<&str>) -> anyhow::Result<Result<Gpu, String>> {
         Some(name) => Ok(Ok(Gpu::headless(&AdapterSelect::Named(name.to_owned()))?)),
         None => Ok(Gpu::headless(&AdapterSelect::Auto).map_err(|error| error.to_string())),
     }
-}
-
-fn write_text(path: &Path, text: &str) -> anyhow::Result<()> {
-    use std::io::Write;
-    Ok(write_atomically(path, |writer| writer.write_all(text.as_bytes()).map_err(|error| error.to_string()))?)
 }

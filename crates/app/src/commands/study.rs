@@ -3,14 +3,10 @@
 //! Error against samples is rendered once and depends on no clock; seconds a sample are measured apart, in short alternating
 //! rounds. Every part leaves files behind and is not repeated when they are there.
 
-use std::io::Write;
-use std::path::Path;
-
 use anyhow::Context;
 use tracer::gpu::{AdapterSelect, Gpu};
 
 use crate::cli::study::{Part, StudyArgs};
-use crate::output::write_atomically;
 use bench::Bench;
 use rates::Rates;
 
@@ -35,10 +31,6 @@ mod tables;
 /// # Errors
 /// Bad input, an adapter that cannot do it, or a folder that holds another study.
 pub fn run(args: &StudyArgs) -> anyhow::Result<()> {
-    for folder in ["runs", "references"] {
-        let folder = args.output.join(folder);
-        std::fs::create_dir_all(&folder).with_context(|| format!("{} cannot be made", folder.display()))?;
-    }
     if args.only != Part::Report {
         measure(args)?;
     }
@@ -51,10 +43,15 @@ pub fn run(args: &StudyArgs) -> anyhow::Result<()> {
 fn measure(args: &StudyArgs) -> anyhow::Result<()> {
     let gpu = Gpu::headless(&args.adapter.clone().map_or(AdapterSelect::Auto, AdapterSelect::Named))?;
     let scenes: Vec<_> = if args.scenes.is_empty() { vec![None] } else { args.scenes.iter().map(Some).collect() };
-    let wants_curves = matches!(args.only, Part::All | Part::Curves);
-    if wants_curves {
-        report::write_provenance(args, &gpu, Part::Curves)?;
+    // Hours into a study is too late to learn that its last scene cannot be read.
+    for scene in &scenes {
+        bench::open(*scene, args.background)?;
     }
+    for folder in ["runs", "references"] {
+        let folder = args.output.join(folder);
+        std::fs::create_dir_all(&folder).with_context(|| format!("{} cannot be made", folder.display()))?;
+    }
+    let wants_curves = matches!(args.only, Part::All | Part::Curves);
     for scene in scenes {
         let mut bench = Bench::new(&gpu, args, scene)?;
         if wants_curves {
@@ -63,13 +60,9 @@ fn measure(args: &StudyArgs) -> anyhow::Result<()> {
             bar.finish_and_clear();
         }
         if args.only != Part::Curves {
-            rates::measure(&mut bench, args, &gpu)?;
+            rates::measure(&mut bench, args)?;
             figure::write(&mut bench, args, &Rates::read(&args.output)?)?;
         }
     }
     Ok(())
-}
-
-fn write_text(path: &Path, text: &str) -> anyhow::Result<()> {
-    Ok(write_atomically(path, |writer| writer.write_all(text.as_bytes()).map_err(|error| error.to_string()))?)
 }

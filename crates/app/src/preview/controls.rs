@@ -58,7 +58,7 @@ impl From<&PreviewArgs> for Controls {
         Self {
             mode: args.sampling.mode,
             acuity: args.sampling.acuity(),
-            adaptive: args.sampling.adaptive,
+            adaptive: args.sampling.adaptive == Switch::On,
             clip: args.clip,
             eccentricity: args.eccentricity,
             screen: args.sampling.screen(),

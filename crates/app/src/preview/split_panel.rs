@@ -1,6 +1,5 @@
 //! The split times in the window: a panel to start a run, keys while it goes on, files when it is done.
 
-use std::io::Write;
 use std::path::PathBuf;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
@@ -13,7 +12,7 @@ use super::engine::Message;
 use super::theme;
 use crate::cli::choices::Mode;
 use crate::config;
-use crate::output::{OutputError, check_writable, free_names, write_atomically};
+use crate::output::{OutputError, check_writable, free_names, write_text};
 use crate::split_times::{After, Moment, Plan, Run};
 
 /// How long until the window looks whether results are written.
@@ -273,9 +272,7 @@ fn write_all(folders: &[PathBuf], runs: Vec<Finished>) -> (Message, Vec<Finished
 }
 
 fn write(names: &[PathBuf; 2], texts: &[String; 2]) -> Result<(), OutputError> {
-    names.iter().zip(texts).try_for_each(|(path, text)| {
-        write_atomically(path, |writer| writer.write_all(text.as_bytes()).map_err(|error| error.to_string()))
-    })
+    names.iter().zip(texts).try_for_each(|(path, text)| write_text(path, text))
 }
 
 /// What stands in the results.

@@ -1,5 +1,7 @@
 //! `fovea bench` as a person or script calls it.
 
+use std::process::{Command, Stdio};
+
 use serde_json::Value;
 
 use crate::support::{Folder, fovea, refuses, text};
@@ -21,6 +23,14 @@ fn the_built_in_scene_is_measured_part_by_part() {
         let raw: Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
         (String::from_utf8(output.stdout).unwrap(), raw["scenes"]["builtin"].clone())
     };
+    // A reader that is gone loses nothing.
+    let edits = ["bench", "--only", "edits", "--gazes", "1", "--rounds", "1"];
+    let mut gone = Command::new(env!("CARGO_BIN_EXE_fovea"));
+    let mut child = gone.args(edits).args(small).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    drop(child.stdout.take());
+    assert_eq!(child.wait().unwrap().code(), Some(2));
+    assert!(std::fs::read_to_string(&file).unwrap().contains("first_move_s"));
+    std::fs::remove_file(&file).unwrap();
     let (printed, measured) = run(&["--only", "rays,modes,edits", "--gazes", "2", "--rounds", "2"]);
     assert!(["Rays", "Modes", "Edits"].iter().all(|heading| printed.contains(heading)), "{printed}");
     // Another part is added to what the file holds.
@@ -92,6 +102,12 @@ fn the_built_in_scene_is_measured_part_by_part() {
     assert!(fovea(&["bench", "--only", "report", "--json", text(&file), "--report", text(&pages)]).status.success());
     assert_eq!(std::fs::read_to_string(pages.join("speed.md")).unwrap(), page);
     assert!(["speed-rays.svg", "speed-modes.svg"].iter().all(|plot| pages.join(plot).exists()));
+    // It speaks of other machines and measurements only where there are notes beside the numbers.
+    assert!(["sponza", "bmw", "sequence.md", "at hand"].iter().all(|theirs| !page.contains(theirs)), "{page}");
+    std::fs::write(folder.path("speed.notes.md"), "Measured on the abacus.\n").unwrap();
+    assert!(fovea(&["bench", "--only", "report", "--json", text(&file), "--report", text(&pages)]).status.success());
+    let noted = std::fs::read_to_string(pages.join("speed.md")).unwrap();
+    assert_eq!(noted.replacen("\nMeasured on the abacus.\n", "", 1), page);
 }
 
 #[test]
@@ -107,6 +123,16 @@ fn a_bench_of_what_is_not_there_is_refused() {
     refuses(&["bench", "--report", "here"], &["--json"]);
     refuses(&["bench", "--only", "report"], &["--report"]);
     refuses(&["bench", "--adapter", "abacus"], &["abacus"]);
-    refuses(&["bench", "--json", text(&other)], &["other.json", "fovea bench"]);
-    assert_eq!(std::fs::read_to_string(&other).unwrap(), "[1, 2]");
+    for not_of_bench in [r#"{"scenes":{"builtin":7}}"#, r#"{"scenes":{"builtin":{"rays":[1]}}}"#, "[1, 2]"] {
+        std::fs::write(&other, not_of_bench).unwrap();
+        refuses(&["bench", "--json", text(&other)], &["other.json", "fovea bench"]);
+        assert_eq!(std::fs::read_to_string(&other).unwrap(), not_of_bench);
+    }
+    let (json, pages) = (folder.path("speed.json"), folder.path("pages"));
+    let report = ["bench", "--json", text(&json), "--report", text(&pages), "--only"];
+    refuses(&[report.as_slice(), &["report,rays"]].concat(), &["--only report"]);
+    refuses(&[report.as_slice(), &["report"]].concat(), &["speed.json", "no measurement"]);
+    let within_a_file = folder.path("square.gltf").join("pages");
+    refuses(&["bench", "--json", text(&json), "--report", text(&within_a_file)], &["square.gltf", "cannot be made"]);
+    assert!(!json.exists() && !pages.exists());
 }

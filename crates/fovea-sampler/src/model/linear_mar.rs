@@ -23,8 +23,6 @@ pub struct LinearMar {
 impl LinearMar {
     /// Guenter et al. 2012, the more cautious slope: `k = 48 x 0.022 = 1.056` per degree.
     pub const GUENTER_2012: Self = Self { k_per_deg: 1.056 };
-    /// Guenter et al. 2012, the steeper slope: `k = 48 x 0.0275 = 1.32` per degree.
-    pub const GUENTER_2012_STEEP: Self = Self { k_per_deg: 1.32 };
 
     /// From the MAR at the gaze in degrees and its growth per degree of eccentricity.
     ///

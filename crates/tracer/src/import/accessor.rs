@@ -41,7 +41,8 @@ impl<'a> Data<'a> {
                         format!("{} '{}'", buffer.place, super::error::one_line(uri))
                     };
                     files.extend(folder.companion(uri));
-                    let bytes = folder.read(uri).map_err(|e| Fault::new(place, ContentError::Unreadable(e)))?;
+                    let bytes = folder.read(uri, buffer.length);
+                    let bytes = bytes.map_err(|e| Fault::new(place, ContentError::Unreadable(e)))?;
                     Some(Cow::Owned(bytes))
                 }
                 None if index == 0 => bin.map(Cow::Borrowed),

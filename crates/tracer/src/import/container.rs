@@ -1,7 +1,9 @@
 //! From a path or bytes to JSON and buffers: the .glb container, `data:` URIs, percent-encoded relative paths.
 
 use std::borrow::Cow;
-use std::path::{Path, PathBuf};
+use std::fs::File;
+use std::io::Read;
+use std::path::{Component, Path, PathBuf};
 
 use serde_json::Value;
 
@@ -83,25 +85,47 @@ pub(super) struct Folder {
 }
 
 impl Folder {
-    /// The file that a relative URI means; `None` for `data:` URIs.
+    /// The file that a relative URI means; `None` for all others.
     pub(super) fn companion(&self, uri: &str) -> Option<PathBuf> {
-        let folder = self.path.as_ref().filter(|_| !uri.starts_with("data:"))?;
-        let decoded = folder.join(percent_decoded(uri));
+        let name = percent_decoded(uri);
+        let folder =
+            self.path.as_ref().filter(|_| !uri.starts_with("data:") && is_relative(uri) && is_relative(&name))?;
+        let decoded = folder.join(name);
         // Writers that forgot to percent-encode a '%' mean the literal name.
         let literal = folder.join(uri);
         Some(if !decoded.exists() && literal.exists() { literal } else { decoded })
     }
 
-    /// What a URI refers to.
-    pub(super) fn read(&self, uri: &str) -> Result<Vec<u8>, String> {
+    /// What a URI refers to; of a file at most so many bytes.
+    pub(super) fn read(&self, uri: &str, most_bytes: u64) -> Result<Vec<u8>, String> {
         if let Some(data) = uri.strip_prefix("data:") {
             return decode_data_uri(data);
         }
         match self.companion(uri) {
-            Some(path) => std::fs::read(&path).map_err(|e| e.to_string()),
-            None => Err("a scene in memory has no companion files".to_owned()),
+            Some(path) => read_file(&path, most_bytes),
+            None if self.path.is_none() => Err("a scene in memory has no companion files".to_owned()),
+            None => Err("only files are read that are named relative to the scene's".to_owned()),
         }
     }
+}
+
+/// Whether a URI or name leads on from a folder: it has neither a scheme with an authority nor a root or drive.
+fn is_relative(uri: &str) -> bool {
+    let has_root = |part: Component<'_>| matches!(part, Component::Prefix(_) | Component::RootDir);
+    !uri.contains("://") && !Path::new(uri).components().any(has_root)
+}
+
+/// What a file begins with. Pipes and devices, which may never end, are refused before they are opened.
+fn read_file(path: &Path, most_bytes: u64) -> Result<Vec<u8>, String> {
+    let about = path.metadata().map_err(|e| e.to_string())?;
+    if !about.is_file() {
+        return Err("it is no regular file".to_owned());
+    }
+    let length = usize::try_from(about.len().min(most_bytes)).map_err(|e| e.to_string())?;
+    let mut bytes = Vec::new();
+    bytes.try_reserve_exact(length).map_err(|e| e.to_string())?;
+    File::open(path).and_then(|file| file.take(most_bytes).read_to_end(&mut bytes)).map_err(|e| e.to_string())?;
+    Ok(bytes)
 }
 
 /// What follows `data:`.
@@ -184,5 +208,16 @@ mod tests {
         assert_eq!(percent_decoded("a%20b%C3%A9.png"), "a bé.png");
         assert_eq!(percent_decoded("100%"), "100%");
         assert_eq!(percent_decoded("%zz%FF"), "%zz%FF");
+    }
+
+    #[test]
+    fn companions_are_named_relative_to_the_scene() {
+        let folder = Folder { path: Some("scene".into()) };
+        for uri in ["a.bin", "../textures/a%20b.png", "./a.png", "wall:1.png"] {
+            assert_eq!(folder.companion(uri), Some(Path::new("scene").join(percent_decoded(uri))), "{uri}");
+        }
+        for uri in ["/etc/hosts", "%2Fetc/hosts", "file:///etc/hosts", "https://host/a.png", "data:,a"] {
+            assert_eq!(folder.companion(uri), None, "{uri}");
+        }
     }
 }

@@ -19,6 +19,8 @@ use crate::scene::{ContentHash, TexelEncoding, Texture};
 const MAX_SIDE: u32 = 16_384;
 /// Largest area of an image, pixels.
 const MAX_PIXELS: u64 = 1 << 27;
+/// Longest part of an image file that is read: more than as many pixels take without compression, 16 bits a channel.
+const MAX_FILE_BYTES: u64 = 10 * MAX_PIXELS;
 
 /// What a texture is for: decides its encoding and what stands in for it when it is missing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -220,7 +222,7 @@ fn read_image(
     let owned;
     let bytes: &[u8] = match (image.view, image.uri) {
         (Some(view), _) => data.view(view)?,
-        (None, Some(uri)) => match folder.read(uri) {
+        (None, Some(uri)) => match folder.read(uri, MAX_FILE_BYTES) {
             Ok(bytes) => {
                 owned = bytes;
                 &owned

@@ -85,10 +85,6 @@ pub fn text(raw: &Value) -> String {
         let is_met = material.max(first).max(moves) <= EDIT_SECS && in_fovea >= EDIT_SAMPLES;
         let goal = format!("edit to a picture of later samples, 1,000 in the foveal disc, {name}: at most 100 ms");
         line(&goal, format!("{times}; {in_fovea} samples"), is_met);
-        let look = middle(&found["gaze_s"]) * 1e3;
-        // Nothing restarts or compiles for a gaze: the batch that is recorded next uses it.
-        let found = format!("the next batch: {look:.0} ms with its picture, {name}");
-        line("gaze change to a batch that uses it: one frame", found, look.is_finite());
     }
     for (name, found) in scenes(raw, Part::Start).iter().filter(|(name, _)| *name == SPONZA) {
         for (state, limit) in ["cached", "cold"].into_iter().zip(START_SECS) {

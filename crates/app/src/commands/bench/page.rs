@@ -3,6 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use anyhow::Context;
 use fovea_sampler::report::{Chart, Mark};
 use serde_json::Value;
 
@@ -10,11 +11,14 @@ use super::goals;
 use super::modes::MODES;
 use super::rays::KINDS;
 use super::schedules;
-use super::write as write_file;
 use crate::cli::bench::Part;
 use crate::commands::study::plan::Method;
 use crate::commands::study::plot::{self, Axis, Scale, Series};
 use crate::commands::study::statistics::{geometric_mean, median};
+use crate::output::{check_writable, write_text};
+
+/// The report's name.
+const PAGE: &str = "speed.md";
 
 /// All tables of what was measured.
 pub fn text(raw: &Value) -> String {
@@ -45,16 +49,28 @@ pub fn text(raw: &Value) -> String {
     text
 }
 
-/// Writes `speed.md` and its plots.
+/// Finds out, before the work is done, whether the report could be written.
+///
+/// # Errors
+/// When the folder cannot be made, or nothing can be written into it.
+pub fn check(folder: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir_all(folder).with_context(|| format!("{} cannot be made", folder.display()))?;
+    Ok(check_writable(&folder.join(PAGE))?)
+}
+
+/// Writes `speed.md`, with notes of the one who measured, and its plots.
 ///
 /// # Errors
 /// When a file cannot be written.
-pub fn write(folder: &Path, raw: &Value) -> anyhow::Result<()> {
-    std::fs::create_dir_all(folder)?;
+pub fn write(folder: &Path, raw: &Value, notes: &str) -> anyhow::Result<()> {
     let mut page = String::from(include_str!("page.md"));
+    if !notes.is_empty() {
+        page += &format!("\n{}\n", notes.trim());
+    }
+    page += "\n![Traversal by gaze](speed-rays.svg)\n\n![Path segments by gaze](speed-modes.svg)\n";
     page += &goals::text(raw);
     page += &text(raw);
-    write_file(&folder.join("speed.md"), &page)?;
+    write_text(&folder.join(PAGE), &page)?;
     plot::write(folder, "speed-rays", &rays_chart(raw))?;
     plot::write(folder, "speed-modes", &modes_chart(raw))
 }

@@ -1,5 +1,6 @@
 //! `--gaze-trace`: samples shared out over a recording's time, each where somebody looked then.
 
+use std::ops::Range;
 use std::path::Path;
 
 use anyhow::{Context, bail};
@@ -29,11 +30,11 @@ pub struct Step {
     pub gaze: GazePoint,
 }
 
-/// A recording as steps of `total` samples.
+/// A recording as steps of the samples from those that the film has to those that it gets.
 ///
 /// # Errors
 /// A file that is no trace or holds no valid row, or a mode that has no gaze.
-pub fn steps(path: &Path, args: &RenderArgs, view: &View, total: u64) -> anyhow::Result<Vec<Step>> {
+pub fn steps(path: &Path, args: &RenderArgs, view: &View, samples: Range<u64>) -> anyhow::Result<Vec<Step>> {
     if args.sampling.mode != Mode::Fv {
         bail!("--gaze-trace needs --mode fv: the other modes do not go by the gaze");
     }
@@ -43,7 +44,7 @@ pub fn steps(path: &Path, args: &RenderArgs, view: &View, total: u64) -> anyhow:
     if looked.is_empty() {
         bail!("{}: no row is valid", path.display());
     }
-    Ok(shared_out(&looked, total))
+    Ok(shared_out(&looked, samples))
 }
 
 /// A recording as steps of `total` samples, unfiltered, on a screen that shows the view and nothing else.
@@ -73,7 +74,7 @@ pub fn within_view(path: &Path, view: &View, total: u64) -> anyhow::Result<Vec<S
     if looked.is_empty() {
         bail!("no row is valid");
     }
-    Ok(shared_out(&looked, total))
+    Ok(shared_out(&looked, 0..total))
 }
 
 /// Filtered gaze, each with the seconds for which it holds. Rows before the first valid one are left out.
@@ -122,28 +123,29 @@ fn place(trace: &Trace, args: &RenderArgs) -> WindowPlace {
 }
 
 /// Steps whose samples are in proportion to their time, on boundaries that cut the sequence into few batches.
-fn shared_out(looked: &[(f64, GazePoint)], total: u64) -> Vec<Step> {
+fn shared_out(looked: &[(f64, GazePoint)], film: Range<u64>) -> Vec<Step> {
+    let count = film.end.saturating_sub(film.start);
     let whole_secs: f64 = looked.iter().map(|(secs, _)| secs).sum();
     let most = looked.len().min(MOST_STEPS) as u64;
-    let block = (total / (4 * most)).clamp(1, LARGEST_BLOCK);
+    let block = (count / (4 * most)).clamp(1, LARGEST_BLOCK);
     let block = 1_u64 << block.ilog2();
     let mut steps: Vec<Step> = Vec::new();
     let mut passed_secs = 0.0;
     for (secs, gaze) in looked {
         passed_secs += secs;
-        let ideal = (total as f64 * (passed_secs / whole_secs)).round() as u64;
-        let samples = (ideal / block * block).min(total);
-        let before = steps.last().map_or(0, |step| step.samples);
+        let ideal = film.start + (count as f64 * (passed_secs / whole_secs)).round() as u64;
+        let samples = (ideal / block * block).min(film.end);
+        let before = steps.last().map_or(film.start, |step| step.samples);
         // A step shorter than a block joins the next; which of both gazes it takes makes no difference to that.
-        let shortest = total / MOST_STEPS as u64;
+        let shortest = count / MOST_STEPS as u64;
         if samples > before && samples - before >= shortest {
             steps.push(Step { samples, gaze: *gaze });
         }
     }
     if let Some((_, gaze)) = looked.last()
-        && steps.last().is_none_or(|step| step.samples < total)
+        && steps.last().is_none_or(|step| step.samples < film.end)
     {
-        steps.push(Step { samples: total, gaze: *gaze });
+        steps.push(Step { samples: film.end, gaze: *gaze });
     }
     steps
 }
@@ -202,11 +204,16 @@ mod tests {
         let looked = looked(&trace(&format!("# gaze-trace v1; space=screen01\n{rows}")), &args(""), &view());
         assert_eq!(looked.len(), 100);
         let total = 1 << 20;
-        let steps = shared_out(&looked, total);
+        let steps = shared_out(&looked, 0..total);
         assert_eq!(steps.last().unwrap().samples, total);
         assert!(steps.windows(2).all(|pair| pair[0].samples < pair[1].samples));
         let left = steps.iter().rfind(|step| step.gaze.on_view.x < 0.0).unwrap().samples;
         assert!((left as f64 / total as f64 - 0.25).abs() < 0.01, "{left}");
+        // A film that has half of them already gets a quarter of the rest at the left.
+        let steps = shared_out(&looked, total / 2..total);
+        assert_eq!(steps.last().unwrap().samples, total);
+        let left = steps.iter().rfind(|step| step.gaze.on_view.x < 0.0).unwrap().samples - total / 2;
+        assert!((left as f64 / total as f64 - 0.125).abs() < 0.005, "{left}");
     }
 
     #[test]
@@ -226,7 +233,7 @@ mod tests {
         let gaze = GazePoint { direction: Vec3::NEG_Z, on_view: Vec2::ZERO };
         let long = vec![(0.01, gaze); 100_000];
         for total in [1, 7, 1000, 5_000_000] {
-            let steps = shared_out(&long, total);
+            let steps = shared_out(&long, 0..total);
             assert!(steps.len() <= MOST_STEPS + 1, "{total}: {}", steps.len());
             assert_eq!(steps.last().unwrap().samples, total);
         }

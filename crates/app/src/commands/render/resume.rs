@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, bail};
 use glam::Quat;
 use serde_json::{Map, Value};
-use tracer::film::FilmHeader;
+use tracer::film::{FilmHeader, FilmMapping, FilmOptions};
 use tracer::renderer::{FilmPose, Renderer, RendererOptions, SequenceKind};
 
 use super::film_options;
@@ -26,11 +26,18 @@ pub fn take_over(
     let mut options = film.renderer_options();
     for option in &args.stated {
         let (asked, found) = match *option {
-            "film" => (format!("{:?}", film_options(args.film, camera)), format!("{:?}", film.options)),
-            "camera" => (camera.position.to_string(), film.pose.position.to_string()),
+            "film" => (film_in_words(&film_options(args.film, camera)), film_in_words(&film.options)),
+            "camera" => (format!("at {} m", camera.position), format!("at {} m", film.pose.position)),
             "orient" => {
-                let asked = if args.orient == Some(Orient::Camera) { camera.rotation } else { Quat::IDENTITY };
-                (asked.to_string(), film.pose.world_from_film.to_string())
+                let (asked, axes) = match args.orient {
+                    Some(Orient::Camera) => ("camera", camera.rotation),
+                    _ => ("world", Quat::IDENTITY),
+                };
+                if axes == film.pose.world_from_film {
+                    continue;
+                }
+                let off_deg = axes.angle_between(film.pose.world_from_film).to_degrees();
+                (asked.to_owned(), format!("{off_deg:.1} degrees from it"))
             }
             "seed" if film.ranges.iter().any(|range| range.seed == args.sampling.seed) => {
                 // A film of several seeds goes on with any of them.
@@ -40,15 +47,27 @@ pub fn take_over(
             "seed" => (args.sampling.seed.to_string(), options.seed.to_string()),
             "sequence" => {
                 let asked = SequenceKind::from(args.sampling.sequence);
-                (format!("{asked:?}"), format!("{:?}", film.sequence))
+                (format!("{asked:?}").to_lowercase(), format!("{:?}", film.sequence).to_lowercase())
             }
             _ => (args.sampling.max_bounces.to_string(), film.max_bounces.to_string()),
         };
         if asked != found {
-            bail!("--{} is {asked}, but the film to go on with has {found}", option.replace('_', "-"));
+            bail!("--{} is {asked}, but that of the film to go on with is {found}", option.replace('_', "-"));
         }
     }
     Ok((options, film.pose))
+}
+
+/// A film as the command line has it; of a perspective one also what its lens sees, which the camera decides.
+fn film_in_words(film: &FilmOptions) -> String {
+    let FilmOptions { mapping, width, height } = film;
+    match mapping {
+        FilmMapping::Equirect => format!("equirect:{width}x{height}"),
+        FilmMapping::Perspective { half_extent: [x, y] } => {
+            let [across, up] = [x, y].map(|tan| 2.0 * tan.atan().to_degrees());
+            format!("perspective:{width}x{height} of {across} by {up} degrees")
+        }
+    }
 }
 
 /// Puts the film into a renderer that has its scene and pose; what is left are its settings. The largest films are too large to

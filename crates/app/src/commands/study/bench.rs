@@ -62,6 +62,11 @@ impl Bench {
         Ok(Self { name, scene: loaded, places, film, renderer, inverses })
     }
 
+    /// The adapter that it is measured on.
+    pub fn gpu(&self) -> &Gpu {
+        self.renderer.gpu()
+    }
+
     /// Pose of the film in the world.
     pub fn pose(&self) -> FilmPose {
         self.renderer.pose()

@@ -11,8 +11,9 @@ use super::error::{Film, Reference, Regions, Rgb, by_region, luminance};
 use super::picture::{self, Crop, Fovea};
 use super::plan::{Method, Place};
 use super::record::{self, Row, RunKey};
-use crate::cli::study::StudyArgs;
-use crate::output::write_atomically;
+use super::report;
+use crate::cli::study::{Part, StudyArgs};
+use crate::output::{write_atomically, write_text};
 
 /// Seeds of the references: no run has them.
 const REFERENCE_SEEDS: [u32; 2] = [0x5eed_0001, 0x5eed_0002];
@@ -202,7 +203,7 @@ fn claim(bench: &Bench, args: &StudyArgs) -> anyhow::Result<()> {
     match std::fs::read_to_string(&path) {
         Ok(found) if found == text => Ok(()),
         Ok(_) => bail!("{}: the folder holds a study with other settings; take another --out", path.display()),
-        Err(_) => super::write_text(&path, &text),
+        Err(_) => Ok(write_text(&path, &text)?),
     }
 }
 
@@ -221,6 +222,7 @@ pub fn render_missing(bench: &mut Bench, args: &StudyArgs, progress: &dyn Fn(f64
         |job: &Job| job.method.schedule(pixels, args.spp, job.places[0] == 0).last().copied().unwrap_or(0) as f64;
     let reference_cost = 2.0 * (args.reference_spp * pixels) as f64;
     let whole = reference_cost + jobs.iter().map(cost).sum::<f64>();
+    report::write_provenance(args, bench.gpu(), Part::Curves)?;
     let references = References::new(bench, args)?;
     let mut done = reference_cost;
     for job in &jobs {

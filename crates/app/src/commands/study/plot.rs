@@ -5,7 +5,7 @@ use std::path::Path;
 use fovea_sampler::report::{Chart, Mark, Shape};
 
 use crate::commands::sampler::raster;
-use crate::output::png;
+use crate::output::{png, write_text};
 
 const SIZE_PX: [f64; 2] = [960.0, 600.0];
 /// Left, top, right, bottom edge of the axes.
@@ -205,7 +205,7 @@ pub fn bars(title: &str, caption: &str, y: &str, groups: &[Bars], legend: &[(&st
 /// # Errors
 /// When a file cannot be written.
 pub fn write(folder: &Path, name: &str, chart: &Chart) -> anyhow::Result<()> {
-    super::write_text(&folder.join(format!("{name}.svg")), &chart.svg())?;
+    write_text(&folder.join(format!("{name}.svg")), &chart.svg())?;
     let ([width, height], texels) = raster::draw(chart);
     Ok(png::write(&folder.join(format!("{name}.png")), width, height, &texels)?)
 }

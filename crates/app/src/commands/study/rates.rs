@@ -6,12 +6,12 @@ use std::fmt::Write;
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use tracer::gpu::Gpu;
 
 use super::bench::Bench;
 use super::plan::{Method, Place};
 use super::{report, statistics};
 use crate::cli::study::{Part, StudyArgs};
+use crate::output::write_text;
 use crate::process::cpu_secs;
 
 /// Rounds over the methods.
@@ -48,13 +48,13 @@ pub struct Round {
 ///
 /// # Errors
 /// When the device is lost, or the file is not what [`to_csv`] made or cannot be written.
-pub fn measure(bench: &mut Bench, args: &StudyArgs, gpu: &Gpu) -> anyhow::Result<()> {
+pub fn measure(bench: &mut Bench, args: &StudyArgs) -> anyhow::Result<()> {
     let mut rounds = read(&args.output)?;
     for place in bench.places.clone() {
         if args.only == Part::Rates || is_missing(&rounds, &bench.name, &place.name()) {
-            report::write_provenance(args, gpu, Part::Rates)?;
+            report::write_provenance(args, bench.gpu(), Part::Rates)?;
             put(&mut rounds, measure_at(bench, args, &place)?);
-            super::write_text(&args.output.join(FILE), &to_csv(&rounds))?;
+            write_text(&args.output.join(FILE), &to_csv(&rounds))?;
         }
     }
     Ok(())

@@ -9,6 +9,7 @@ use anyhow::{Context, bail};
 use super::error::{Errors, FilmMeasures};
 use super::picture::PictureMeasures;
 use super::plan::Method;
+use crate::output::write_text;
 
 /// Measures in a row, by name. `film` is the film's error over pixels that have a sample, `view` that of the reconstructed
 /// picture; `r1` to `r6` are rings of eccentricity to 10, 20, 28, 40, 60 and 80 degrees.
@@ -162,7 +163,7 @@ fn parse(line: &str) -> anyhow::Result<(RunKey, Row)> {
 /// # Errors
 /// When the file cannot be written.
 pub fn write(folder: &Path, key: &RunKey, rows: &Vec<Row>) -> anyhow::Result<()> {
-    super::write_text(&key.path(folder), &to_csv([(key, rows)]))
+    Ok(write_text(&key.path(folder), &to_csv([(key, rows)]))?)
 }
 
 /// Reads all finished runs.

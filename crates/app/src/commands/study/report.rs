@@ -1,5 +1,6 @@
 //! The study's outputs: one page of Markdown, plots, all raw rows as one CSV, and the numbers of the page as JSON.
 
+use anyhow::bail;
 use fovea_sampler::report::Mark;
 use serde_json::{Value, json};
 use tracer::gpu::Gpu;
@@ -11,11 +12,13 @@ use super::plan::{Method, RING_EDGES_DEG};
 use super::plot::{self, Axis, Bars, Scale, Series};
 use super::tables;
 use crate::cli::study::{Part, StudyArgs};
+use crate::output::write_text;
 
 /// Where and with what the parts were measured.
 const PROVENANCE: &str = "provenance.json";
 
-/// Notes where a part of the study is measured: curves or rates; for curves, where the first of them were.
+/// Notes with what a part of the study is measured that begins now: curves or rates. Curves say where the first of them were
+/// measured, rates where the last; the command lines of all are kept.
 ///
 /// # Errors
 /// When the file cannot be written.
@@ -23,11 +26,21 @@ pub fn write_provenance(args: &StudyArgs, gpu: &Gpu, part: Part) -> anyhow::Resu
     let here: Value = Provenance::on(gpu).fields().into_iter().map(|(name, value)| (name, value.to_owned())).collect();
     let mut all = read_provenance(args);
     let name = if part == Part::Rates { "rates" } else { "curves" };
+    let commands = with_command(all[name]["command"].as_str(), command());
     if part == Part::Rates || all[name].is_null() {
         all[name] = here;
-        all[name]["command"] = command().into();
     }
-    super::write_text(&args.output.join(PROVENANCE), &format!("{all:#}\n"))
+    all[name]["command"] = commands.into();
+    Ok(write_text(&args.output.join(PROVENANCE), &format!("{all:#}\n"))?)
+}
+
+/// Command lines that measured something, each once.
+fn with_command(earlier: Option<&str>, command: String) -> String {
+    match earlier {
+        Some(earlier) if earlier.split("; ").any(|one| one == command) => earlier.to_owned(),
+        Some(earlier) => format!("{earlier}; {command}"),
+        None => command,
+    }
 }
 
 /// The command line, of paths the last part alone.
@@ -47,10 +60,13 @@ fn read_provenance(args: &StudyArgs) -> Value {
 /// When the folder holds no study or a file cannot be written.
 pub fn write(args: &StudyArgs) -> anyhow::Result<()> {
     let analysis = Analysis::read(&args.output)?;
+    if args.only == Part::Report && analysis.scenes().is_empty() {
+        bail!("{}: holds no study", args.output.display());
+    }
     let provenance = read_provenance(args);
-    super::write_text(&args.output.join("curves.csv"), &super::record::to_csv(&analysis.table))?;
-    super::write_text(&args.output.join("study.json"), &format!("{:#}\n", summary(&analysis, &provenance)))?;
-    super::write_text(&args.output.join("study.md"), &page(&analysis, &provenance))?;
+    write_text(&args.output.join("curves.csv"), &super::record::to_csv(&analysis.table))?;
+    write_text(&args.output.join("study.json"), &format!("{:#}\n", summary(&analysis, &provenance)))?;
+    write_text(&args.output.join("study.md"), &page(&analysis, &provenance))?;
     let caption = caption(&provenance);
     for scene in analysis.scenes() {
         let Some(sight) = analysis.sights(scene).first().copied() else { continue };
@@ -245,3 +261,16 @@ fn page(analysis: &Analysis, provenance: &Value) -> String {
 
 /// The page around the tables.
 const TEMPLATE: &str = include_str!("page.md");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn commands_that_measured_are_kept_each_once() {
+        let first = with_command(None, "fovea study a.glb".into());
+        let both = with_command(Some(&first), "fovea study b.glb".into());
+        assert_eq!(both, "fovea study a.glb; fovea study b.glb");
+        assert_eq!(with_command(Some(&both), "fovea study a.glb".into()), both);
+    }
+}
