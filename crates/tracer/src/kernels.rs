@@ -59,6 +59,7 @@ const MODULES: &[(&str, &str)] = &[
     ("scene::traverse", include_str!("../../../shaders/scene/traverse.wesl")),
     ("scene::texture", include_str!("../../../shaders/scene/texture.wesl")),
     ("scene::alpha", include_str!("../../../shaders/scene/alpha.wesl")),
+    ("scene::coverage", include_str!("../../../shaders/scene/coverage.wesl")),
     ("scene::query", include_str!("../../../shaders/scene/query.wesl")),
     ("scene::identify", include_str!("../../../shaders/scene/identify.wesl")),
     ("scene::surface", include_str!("../../../shaders/scene/surface.wesl")),

@@ -378,6 +378,11 @@ impl Material {
         self.transmission > 0.0 && !self.is_solid() && self.roughness * self.roughness < 1e-3
     }
 
+    /// True when it is a light; what is unlit shows its base colour alone.
+    pub fn emits(&self) -> bool {
+        self.emission.max_element() > 0.0 && !self.unlit
+    }
+
     /// True when something is mirrored: metal, or a dielectric whose specular reflectance is not 0.
     pub fn is_specular(&self) -> bool {
         let dielectric = self.specular > 0.0 || self.transmission > 0.0 || self.iridescence > 0.0;

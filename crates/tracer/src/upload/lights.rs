@@ -7,7 +7,7 @@ use glam::Vec3;
 use super::{AliasTable, geometry::Shapes, placement::Placement};
 use crate::{
     kernels::layout::{self, codes},
-    scene::{PunctualKind, PunctualLight, Scene, Texture},
+    scene::{AlphaMode, Material, PunctualKind, PunctualLight, Scene, Texture},
 };
 
 /// Lights with their alias rows.
@@ -30,7 +30,7 @@ impl LightTable {
             let Some(source) = *source else { continue };
             let instance = &scene.instances[source as usize];
             let material = &scene.materials[instance.material as usize];
-            if material.emission.max_element() <= 0.0 || material.unlit {
+            if !material.emits() {
                 continue;
             }
             placement.instances[index].first_light = lights.len() as u32;
@@ -41,7 +41,8 @@ impl LightTable {
             });
             let sides = if material.double_sided { 2.0 } else { 1.0 };
             // Black texels in a dark texture still must be reachable where its mean is not zero elsewhere.
-            let radiance = f64::from(luminance(material.emission * mean.max(Vec3::splat(1e-4)))) * sides;
+            let radiance =
+                f64::from(luminance(material.emission * mean.max(Vec3::splat(1e-4))) * most_coverage(material)) * sides;
             let mesh = &scene.meshes[instance.mesh as usize];
             let is_mirrored = instance.world_from_mesh.matrix3.determinant() < 0.0;
             for triangle in &mesh.triangles {
@@ -65,7 +66,7 @@ impl LightTable {
                 });
             }
         }
-        if scene.materials.iter().any(|m| m.emissive_texture.is_some()) {
+        if scene.materials.iter().any(|m| m.emits() && varies(m)) {
             enter_triangles(shapes, placement, &mut lights);
         }
         let reach = scene.bounds().map_or(1.0, |(low, high)| f64::from((high - low).length()) * 0.5);
@@ -125,7 +126,22 @@ impl Twins {
     }
 }
 
-/// Tells each light the triangle whose texture coordinates it has. A mesh that is placed often lends its copies one.
+/// Whether what a point of the material emits depends on more than the material.
+fn varies(material: &Material) -> bool {
+    material.emissive_texture.is_some() || material.alpha_mode != AlphaMode::Opaque
+}
+
+/// The most of an emitter that is there at any of its points: textures and vertices only take from it.
+fn most_coverage(material: &Material) -> f32 {
+    let alpha = material.base_color.w;
+    match material.alpha_mode {
+        AlphaMode::Opaque => 1.0,
+        AlphaMode::Blend => alpha,
+        AlphaMode::Mask { cutoff } => f32::from(u8::from(alpha >= cutoff)),
+    }
+}
+
+/// Tells each light the triangle whose vertices it has. A mesh that is placed often lends its copies one.
 fn enter_triangles(shapes: &Shapes, placement: &Placement, lights: &mut [layout::Light]) {
     let mut entries: Vec<(u32, u32)> = Vec::new();
     for (index, instance) in placement.instances.iter().enumerate() {

@@ -1,0 +1,77 @@
+//! Lights that are surfaces: what covers them in part, what lies over them and where they coincide, by closed forms.
+#![expect(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::sync::Arc;
+
+use fovea_tests::{
+    device,
+    known::{SAMPLES, assert_is, corner_form_factor, floor, measure_by},
+    scenes::{Builder, emitter},
+};
+use glam::{Vec3, Vec4};
+use tracer::{
+    gpu::Gpu,
+    renderer::SamplingTechnique,
+    scene::{AlphaMode, Material, Scene, TexelEncoding},
+};
+
+/// Of the floor.
+const ALBEDO: f32 = 0.8;
+/// From the floor straight up to the middle of the lamp, and half its side.
+const HEIGHT: f32 = 1.0;
+const HALF: f32 = 1.0;
+/// A camera between floor and lamp.
+const RAY: [Vec3; 2] = [Vec3::new(0.3, 0.5, 0.1), Vec3::ZERO];
+
+/// A lamp whose front looks down.
+fn lamp(builder: &mut Builder, material: u32) {
+    builder.quad(Vec3::new(-HALF, HEIGHT, -HALF), Vec3::X * (2.0 * HALF), Vec3::Z * (2.0 * HALF), material);
+}
+
+/// Of the floor below a lamp of radiance 1.
+fn below_the_lamp() -> f64 {
+    f64::from(ALBEDO) * 4.0 * corner_form_factor(HALF.into(), HALF.into(), HEIGHT.into())
+}
+
+/// Of a floor below what `add` builds, by light sampling, BSDF sampling and both.
+fn assert_floor(gpu: &Gpu, what: &str, expected: f64, scene: &Scene) {
+    for technique in [SamplingTechnique::Lights, SamplingTechnique::Bsdf, SamplingTechnique::Both] {
+        let value = measure_by(gpu, scene, RAY, 1, (technique, 2 * SAMPLES));
+        assert_is(&format!("{what}, {technique:?}"), value, expected);
+    }
+}
+
+/// Of what alpha leaves of a lamp, light arrives in proportion: by a factor, by a texture, by vertices.
+#[test]
+fn alpha_takes_from_what_a_lamp_sends() {
+    let gpu = device::gpu();
+    let mask = AlphaMode::Mask { cutoff: 0.5 };
+    for (what, alpha_mode, alpha, texels, share) in [
+        ("opaque, whatever its alpha", AlphaMode::Opaque, 0.2, None, 1.0),
+        ("half blended", AlphaMode::Blend, 0.5, None, 0.5),
+        ("blended away", AlphaMode::Blend, 0.0, None, 0.0),
+        ("kept by a mask", mask, 0.6, None, 1.0),
+        ("cut out", mask, 0.2, None, 0.0),
+        ("blended by a texture", AlphaMode::Blend, 1.0, Some([51, 204]), 0.5),
+        ("cut out by a texture", mask, 1.0, Some([0, 255]), 0.5),
+    ] {
+        let mut builder = Builder::new(Vec3::ZERO);
+        floor(&mut builder, ALBEDO);
+        let base_color_texture =
+            texels.map(|texels| builder.texture(2, TexelEncoding::Srgb, texels.map(|a| [0, 0, 0, a]).to_vec()));
+        let base_color = Vec4::new(0.0, 0.0, 0.0, alpha);
+        let material = Material { alpha_mode, base_color, base_color_texture, ..emitter(Vec3::ONE) };
+        let material = builder.material(material);
+        lamp(&mut builder, material);
+        assert_floor(&gpu, what, share * below_the_lamp(), &builder.build());
+    }
+    // From nothing at -X to all at +X.
+    let mut builder = Builder::new(Vec3::ZERO);
+    floor(&mut builder, ALBEDO);
+    let material = builder.material(Material { alpha_mode: AlphaMode::Blend, ..emitter(Vec3::ONE) });
+    lamp(&mut builder, material);
+    let mut scene = builder.build();
+    let mesh = Arc::make_mut(scene.meshes.last_mut().unwrap());
+    mesh.colors = mesh.positions.iter().map(|p| Vec4::new(1.0, 1.0, 1.0, 0.5 + 0.5 * p.x / HALF)).collect();
+    assert_floor(&gpu, "blended by its vertices", 0.5 * below_the_lamp(), &scene);
+}
