@@ -204,7 +204,7 @@ pub enum AlphaMode {
     Opaque,
     /// Present where alpha is at least the cutoff.
     Mask {
-        /// In 0..=1.
+        /// At least 0; above 1 nothing is present.
         cutoff: f32,
     },
     /// Alpha is the fraction of light that the surface stops.
