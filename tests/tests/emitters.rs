@@ -75,3 +75,37 @@ fn alpha_takes_from_what_a_lamp_sends() {
     mesh.colors = mesh.positions.iter().map(|p| Vec4::new(1.0, 1.0, 1.0, 0.5 + 0.5 * p.x / HALF)).collect();
     assert_floor(&gpu, "blended by its vertices", 0.5 * below_the_lamp(), &scene);
 }
+
+/// A lamp that is there twice lights once, whichever way its corners go round, zeros are signed and its sides emit.
+#[test]
+fn lamps_in_the_same_place_are_one() {
+    let gpu = device::gpu();
+    let expected = f64::from(ALBEDO) * 2.0 * corner_form_factor(2.0 * f64::from(HALF), HALF.into(), HEIGHT.into());
+    let (x, z) = (Vec3::X * (2.0 * HALF), Vec3::Z * (2.0 * HALF));
+    let corner = Vec3::new(0.0, HEIGHT, -HALF);
+    let same = (corner, x, z);
+    let negative_zero = (Vec3::new(-0.0, HEIGHT, -HALF), x, z);
+    let from_the_other_end = (corner + x + z, -x, -z);
+    let turned_over = (corner, z, x);
+    for (what, (corner, edge_1, edge_2), double_sided, is_first) in [
+        ("the same", same, false, false),
+        ("another zero", negative_zero, false, false),
+        ("from the other end", from_the_other_end, false, false),
+        ("both sides", same, true, false),
+        ("both sides, before", same, true, true),
+        ("both sides, turned over", turned_over, true, false),
+    ] {
+        let mut builder = Builder::new(Vec3::ZERO);
+        floor(&mut builder, ALBEDO);
+        let one_side = builder.material(emitter(Vec3::ONE));
+        let copy = builder.material(Material { double_sided, ..emitter(Vec3::ONE) });
+        if is_first {
+            builder.quad(corner, edge_1, edge_2, copy);
+        }
+        builder.quad(same.0, same.1, same.2, one_side);
+        if !is_first {
+            builder.quad(corner, edge_1, edge_2, copy);
+        }
+        assert_floor(&gpu, what, expected, &builder.build());
+    }
+}

@@ -1,6 +1,6 @@
 //! The light table: every emissive triangle and punctual light, weighted by power.
 
-use std::collections::{HashMap, hash_map::Entry};
+use std::collections::HashMap;
 
 use glam::Vec3;
 
@@ -23,7 +23,7 @@ impl LightTable {
     pub(super) fn build(scene: &Scene, shapes: &Shapes, placement: &mut Placement) -> Self {
         let mut lights = Vec::new();
         let mut powers = Vec::new();
-        let mut twins = Twins::default();
+        let mut sites = Vec::new();
         let mut brightest: f32 = 0.0;
         let mut means: HashMap<u32, Vec3> = HashMap::new();
         for (index, source) in placement.sources.iter().enumerate() {
@@ -53,8 +53,8 @@ impl LightTable {
                 }
                 let (edge_1, edge_2) = (b - a, c - a);
                 let two_areas = edge_1.as_dvec3().cross(edge_2.as_dvec3()).length();
-                let is_twin = twins.enter([a, b, c], material.double_sided, lights.len());
-                powers.push(if is_twin { 0.0 } else { radiance * std::f64::consts::PI * 0.5 * two_areas });
+                sites.push(Site { corners: [a, b, c], double_sided: material.double_sided });
+                powers.push(radiance * std::f64::consts::PI * 0.5 * two_areas);
                 lights.push(layout::Light {
                     position: a.to_array(),
                     edge_1: edge_1.to_array(),
@@ -80,50 +80,61 @@ impl LightTable {
             powers.push(punctual_power(light, reach));
             lights.push(encoded);
         }
+        let twins = twins(&sites);
+        for &(twin, _) in &twins {
+            powers[twin] = 0.0;
+        }
         let table = AliasTable::build(&powers);
         for (i, light) in lights.iter_mut().enumerate() {
             light.probability = table.probabilities[i];
             light.alias_threshold = table.thresholds[i];
             light.alias_index = table.aliases[i];
         }
-        for &(twin, first) in &twins.pairs {
+        for (twin, first) in twins {
             lights[twin].probability = lights[first].probability;
         }
         Self { lights, brightest }
     }
 }
 
-/// Emissive triangles in the same place, facing the same way. A ray sees one of them, so only the first is sampled; the
-/// others have its density, since a ray may hit any of them.
-#[derive(Default)]
-struct Twins {
-    firsts: HashMap<[[u32; 3]; 3], usize>,
-    /// Twin and first.
-    pairs: Vec<(usize, usize)>,
+/// Where an emissive triangle stands.
+struct Site {
+    corners: [Vec3; 3],
+    double_sided: bool,
 }
 
-impl Twins {
-    /// Whether light `index` stands where an earlier one does.
-    fn enter(&mut self, corners: [Vec3; 3], double_sided: bool, index: usize) -> bool {
-        let mut key = corners.map(|corner| corner.to_array().map(f32::to_bits));
-        if double_sided {
-            key.sort_unstable();
-        } else {
-            // The order of the corners says which side is the front.
-            let first = (0..3).min_by_key(|&i| key[i]).unwrap_or(0);
-            key.rotate_left(first);
+impl Site {
+    /// Bits of the corners in ascending order, and whether it is an even permutation of them: which side the front is on.
+    fn place(&self) -> ([[u32; 3]; 3], bool) {
+        // Adding 0 makes one of both zeros; a mirror makes the negative one.
+        let mut corners = self.corners.map(|corner| (corner + Vec3::ZERO).to_array().map(f32::to_bits));
+        let first = (0..3).min_by_key(|&i| corners[i]).unwrap_or(0);
+        corners.rotate_left(first);
+        let is_even = corners[1] <= corners[2];
+        if !is_even {
+            corners.swap(1, 2);
         }
-        match self.firsts.entry(key) {
-            Entry::Vacant(vacant) => {
-                vacant.insert(index);
-                false
-            }
-            Entry::Occupied(first) => {
-                self.pairs.push((index, *first.get()));
-                true
+        (corners, is_even)
+    }
+}
+
+/// Twin and first of emissive triangles in the same place that emit to the same side. A ray sees one of them, so only the first is
+/// sampled; the others have its density, since a ray may hit any of them. One that emits to both sides is the first of all.
+fn twins(sites: &[Site]) -> Vec<(usize, usize)> {
+    let mut firsts = HashMap::new();
+    let mut pairs = Vec::new();
+    let (both, one): (Vec<usize>, Vec<usize>) = (0..sites.len()).partition(|&site| sites[site].double_sided);
+    for index in both.into_iter().chain(one) {
+        let (place, is_even) = sites[index].place();
+        let side = (!sites[index].double_sided).then_some(is_even);
+        match firsts.get(&(place, None)).or_else(|| firsts.get(&(place, side))) {
+            Some(&first) => pairs.push((index, first)),
+            None => {
+                firsts.insert((place, side), index);
             }
         }
     }
+    pairs
 }
 
 /// Whether what a point of the material emits depends on more than the material.
