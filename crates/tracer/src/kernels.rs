@@ -79,6 +79,7 @@ const MODULES: &[(&str, &str)] = &[
     ("path::invocation", include_str!("../../../shaders/path/invocation.wesl")),
     ("path::trace", include_str!("../../../shaders/path/trace.wesl")),
     ("path::shade", include_str!("../../../shaders/path/shade.wesl")),
+    ("path::medium", include_str!("../../../shaders/path/medium.wesl")),
     ("path::start", include_str!("../../../shaders/path/start.wesl")),
     ("path::extend", include_str!("../../../shaders/path/extend.wesl")),
     ("wavefront::bindings", include_str!("../../../shaders/wavefront/bindings.wesl")),
