@@ -1,7 +1,7 @@
 //! Lights that are surfaces: what covers them in part, what lies over them and where they coincide, by closed forms.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::sync::Arc;
+use std::{f64::consts::PI, sync::Arc};
 
 use fovea_tests::{
     device,
@@ -108,4 +108,41 @@ fn lamps_in_the_same_place_are_one() {
         }
         assert_floor(&gpu, what, expected, &builder.build());
     }
+}
+
+/// Reflectance of a boundary between air and an index of 1.5.
+fn fresnel(cosine: f64) -> f64 {
+    let inside = (1.0 - (1.0 - cosine * cosine) / 2.25).sqrt();
+    let s = (cosine - 1.5 * inside) / (cosine + 1.5 * inside);
+    let p = (1.5 * cosine - inside) / (1.5 * cosine + inside);
+    0.5 * (s * s + p * p)
+}
+
+/// A coat lets through what it does not reflect: seen under an angle, and on the floor by quadrature over the lamp.
+#[test]
+fn a_clearcoat_lies_over_what_a_lamp_sends() {
+    let gpu = device::gpu();
+    let clearcoat = 0.8;
+    let let_through = |cosine: f64| 1.0 - f64::from(clearcoat) * fresnel(cosine);
+    let mut builder = Builder::new(Vec3::ZERO);
+    floor(&mut builder, ALBEDO);
+    let coated = builder.material(Material { clearcoat, ..emitter(Vec3::ONE) });
+    lamp(&mut builder, coated);
+    let scene = builder.build();
+    for below in [0.9f32, 0.2] {
+        let eye = Vec3::new(-1.0, HEIGHT - below, 0.0);
+        let value = measure_by(&gpu, &scene, [eye, Vec3::Y * HEIGHT], 0, (SamplingTechnique::Both, SAMPLES));
+        assert_is("seen", value, let_through(f64::from(below / (1.0 + below * below).sqrt())));
+    }
+    const CELLS: u32 = 400;
+    let at = |i: u32| ((f64::from(i) + 0.5) / f64::from(CELLS) * 2.0 - 1.0) * f64::from(HALF);
+    let area = (2.0 * f64::from(HALF) / f64::from(CELLS)).powi(2);
+    let irradiance: f64 = (0..CELLS * CELLS)
+        .map(|cell| {
+            let distance2 = at(cell % CELLS).powi(2) + f64::from(HEIGHT).powi(2) + at(cell / CELLS).powi(2);
+            let cosine = f64::from(HEIGHT) / distance2.sqrt();
+            let_through(cosine) * cosine * cosine / distance2 * area
+        })
+        .sum();
+    assert_floor(&gpu, "coated lamp", f64::from(ALBEDO) * irradiance / PI, &scene);
 }

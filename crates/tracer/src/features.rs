@@ -47,6 +47,8 @@ features! {
     Emission = "EMISSION",
     /// Some material that emits has alpha mask or blend: light samples count by what is there.
     EmissiveAlpha = "EMISSIVE_ALPHA",
+    /// Some material that emits has a clearcoat: what it sends depends on the direction.
+    CoatedEmission = "COATED_EMISSION",
     /// There are emissive triangles or punctual lights to sample.
     Lights = "LIGHTS",
     /// Some directional light has an angular size: rays that leave the scene may see it.
@@ -162,6 +164,7 @@ impl SceneFeatures {
             )
             .with(Feature::Emission, emits)
             .with(Feature::EmissiveAlpha, any(|m| m.emits() && m.alpha_mode != AlphaMode::Opaque))
+            .with(Feature::CoatedEmission, any(|m| m.emits() && m.clearcoat > 0.0))
             .with(Feature::Lights, emits || !scene.lights.is_empty())
             .with(Feature::SunDiscs, scene.lights.iter().any(PunctualLight::is_disc))
             .with(Feature::EnvironmentImage, matches!(scene.environment, Environment::Image { .. }))

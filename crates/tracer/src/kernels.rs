@@ -67,6 +67,7 @@ const MODULES: &[(&str, &str)] = &[
     ("shading::layers", include_str!("../../../shaders/shading/layers.wesl")),
     ("shading::lobes", include_str!("../../../shaders/shading/lobes.wesl")),
     ("shading::local", include_str!("../../../shaders/shading/local.wesl")),
+    ("shading::emission", include_str!("../../../shaders/shading/emission.wesl")),
     ("shading::microfacet", include_str!("../../../shaders/shading/microfacet.wesl")),
     ("shading::normal", include_str!("../../../shaders/shading/normal.wesl")),
     ("shading::sheen", include_str!("../../../shaders/shading/sheen.wesl")),

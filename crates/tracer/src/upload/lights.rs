@@ -139,7 +139,7 @@ fn twins(sites: &[Site]) -> Vec<(usize, usize)> {
 
 /// Whether what a point of the material emits depends on more than the material.
 fn varies(material: &Material) -> bool {
-    material.emissive_texture.is_some() || material.alpha_mode != AlphaMode::Opaque
+    material.emissive_texture.is_some() || material.alpha_mode != AlphaMode::Opaque || material.clearcoat > 0.0
 }
 
 /// The most of an emitter that is there at any of its points: textures and vertices only take from it.
