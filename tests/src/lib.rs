@@ -2,6 +2,7 @@
 
 pub mod cycles;
 pub mod device;
+pub mod known;
 pub mod lobes;
 pub mod pencil;
 pub mod plant;

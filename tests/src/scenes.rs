@@ -22,16 +22,6 @@ pub fn emitter(radiance: Vec3) -> Material {
     Material { emission: radiance, ..lambert(Vec3::ZERO) }
 }
 
-/// Form factor from a point to a parallel rectangle whose corner is straight above (Howell's catalogue, B-3).
-pub fn corner_form_factor(a: f64, b: f64, height: f64) -> f64 {
-    let (a, b) = (a / height, b / height);
-    let part = |p: f64, q: f64| {
-        let root = (1.0 + p * p).sqrt();
-        p / root * (q / root).atan()
-    };
-    (part(a, b) + part(b, a)) / (2.0 * std::f64::consts::PI)
-}
-
 /// An environment image of one radiance everywhere: unlike a constant environment it is sampled as a light.
 pub fn even_image(radiance: f32) -> Environment {
     image(16, 8, vec![[radiance; 3]; 16 * 8])

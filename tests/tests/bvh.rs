@@ -275,10 +275,17 @@ fn slivers_degenerates_duplicates_and_coplanar_triangles() {
     single("coplanar", &grid(0.0).chain(grid(0.1)).collect::<Vec<_>>(), white());
 }
 
-/// A mask whose texels are all opaque changes the kernel, not the hits.
+/// A mask whose texels are all opaque changes the kernel, not the hits, up to a cutoff of 1; above it nothing is there.
 #[test]
 fn alpha_tests_leave_opaque_triangles_alone() {
-    single("alpha mask", &soup(500, 0.6, 6), Material { alpha_mode: AlphaMode::Mask { cutoff: 0.5 }, ..white() });
+    let masked = |cutoff: f32| Material { alpha_mode: AlphaMode::Mask { cutoff }, ..white() };
+    single("alpha mask", &soup(500, 0.6, 6), masked(0.5));
+    single("alpha mask with a cutoff of 1", &soup(500, 0.6, 6), masked(1.0));
+    let mut builder = Builder::new(Vec3::ONE);
+    let material = builder.material(masked(1.5));
+    let mesh = builder.triangles(&soup(500, 0.6, 6), &[]);
+    builder.place(mesh, material, Affine3A::IDENTITY);
+    assert!(hits(&builder.build(), HierarchyKind::Wide).iter().all(Option::is_none));
 }
 
 /// Few copies join the static mesh, many keep a hierarchy of their own: both, with mirrors and unequal scales.

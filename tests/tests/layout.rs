@@ -107,6 +107,10 @@ fn permutations() -> Vec<SceneFeatures> {
 /// With what a feature never occurs without: see [`SceneFeatures::of`].
 fn closed(mut features: SceneFeatures) -> SceneFeatures {
     for (feature, implied) in [
+        (Feature::CoatedEmission, Feature::Clearcoat),
+        (Feature::CoatedEmission, Feature::Emission),
+        (Feature::EmissiveAlpha, Feature::Alpha),
+        (Feature::EmissiveAlpha, Feature::Emission),
         (Feature::Emission, Feature::Lights),
         (Feature::ClearSheets, Feature::Transmission),
         (Feature::SunDiscs, Feature::Lights),

@@ -5,54 +5,20 @@
 use std::f64::consts::PI;
 
 use fovea_tests::{
-    device, pencil,
-    scenes::{Builder, corner_form_factor, emitter, even_image, image, lambert},
+    device,
+    known::{
+        COMPARED_SAMPLES, ROUNDING, SAMPLES, assert_is, assert_techniques_agree, corner_form_factor, floor, measure,
+        measure_by,
+    },
+    scenes::{Builder, emitter, even_image, image, lambert},
 };
 use glam::{Affine3A, DVec3, Quat, Vec3};
 use tracer::{
     distribution::{Distribution, Gaze},
     film::FilmOptions,
-    gpu::Gpu,
     renderer::{FilmPose, Renderer, RendererOptions, SamplingTechnique},
     scene::{AlphaMode, Backdrop, Material, PunctualKind, PunctualLight, Scene, TexelEncoding},
 };
-
-const SAMPLES: u64 = 1 << 17;
-/// Where light sampling, BSDF sampling and both are compared.
-const COMPARED_SAMPLES: u64 = 1 << 20;
-/// Relative rounding of a path's arithmetic in f32.
-const ROUNDING: f64 = 2e-5;
-
-/// Mean luminance of a pencil of rays from `eye` to `target`, and its standard error; nothing is dropped or clamped.
-fn measure(gpu: &Gpu, scene: &Scene, [eye, target]: [Vec3; 2], max_bounces: u32) -> (f64, f64) {
-    measure_by(gpu, scene, [eye, target], max_bounces, (SamplingTechnique::Both, SAMPLES))
-}
-
-fn measure_by(
-    gpu: &Gpu,
-    scene: &Scene,
-    ray: [Vec3; 2],
-    max_bounces: u32,
-    (technique, samples): (SamplingTechnique, u64),
-) -> (f64, f64) {
-    let found = pencil::measure(gpu, scene, ray, max_bounces, samples, |renderer| {
-        renderer.set_technique(technique).unwrap();
-    });
-    assert_eq!((found.statistics.non_finite, found.statistics.clamped), (0, 0));
-    (found.mean, found.error)
-}
-
-fn assert_is(what: &str, (mean, error): (f64, f64), expected: f64) {
-    eprintln!("{what}: {mean:.6} +- {error:.6}, expected {expected:.6}");
-    assert!(error <= 0.005 * expected, "{what}: too noisy for a claim");
-    assert!((mean - expected).abs() <= 3.0 * error + ROUNDING * expected, "{what}");
-}
-
-/// Floor at y = 0, 40 metres wide.
-fn floor(builder: &mut Builder, albedo: f32) {
-    let material = builder.material(lambert(Vec3::splat(albedo)));
-    builder.quad(Vec3::new(-20.0, 0.0, -20.0), Vec3::Z * 40.0, Vec3::X * 40.0, material);
-}
 
 /// White surfaces in an environment of 1 are 1, convex or concave.
 #[test]
@@ -107,22 +73,6 @@ fn closed_furnace_by_every_number_of_bounces() {
         let value = measure(&gpu, &scene, ray, bounces);
         let expected = 0.5 * (1.0 - 0.6f64.powi(bounces as i32 + 1)) / 0.4;
         assert_is(&format!("closed furnace, {bounces} bounces"), value, expected);
-    }
-}
-
-/// Light sampling, BSDF sampling and both give the closed form within 3 standard errors of at most 0.2 %; both together have
-/// at most 1.1 times the variance of the better one, unless that one has none (a constant environment by BSDF sampling).
-fn assert_techniques_agree(gpu: &Gpu, what: &str, scene: &Scene, ray: [Vec3; 2], max_bounces: u32, expected: f64) {
-    let variances = [SamplingTechnique::Lights, SamplingTechnique::Bsdf, SamplingTechnique::Both].map(|technique| {
-        let value = measure_by(gpu, scene, ray, max_bounces, (technique, COMPARED_SAMPLES));
-        assert_is(&format!("{what}, {technique:?}"), value, expected);
-        assert!(value.1 <= 0.002 * expected, "{what}, {technique:?}: too noisy for a comparison");
-        value.1 * value.1
-    });
-    let better = variances[0].min(variances[1]);
-    if better > (ROUNDING * expected).powi(2) {
-        eprintln!("{what}: variance of both over the better one {:.3}", variances[2] / better);
-        assert!(variances[2] <= 1.1 * better, "{what}: both have more variance");
     }
 }
 
@@ -522,4 +472,88 @@ fn a_glass_slab() {
         let value = measure(&gpu, &scene, [eye, Vec3::ZERO], 64);
         assert_is(&format!("glass at {degrees} degrees"), value, (1.0 - reflectance) / (1.0 + reflectance));
     }
+}
+
+/// Tinted water of index 1, so that rays go straight: after a metre half is left.
+fn water() -> Material {
+    Material {
+        metallic: 0.0,
+        roughness: 0.0,
+        transmission: 1.0,
+        thickness: 1.0,
+        ior: 1.0,
+        attenuation_color: Vec3::splat(0.5),
+        attenuation_distance: 1.0,
+        ..Default::default()
+    }
+}
+
+/// What shines in a box of water, below an open surface and behind the box, seen from outside and inside.
+#[test]
+fn what_shines_in_a_medium_is_seen_through_it() {
+    let gpu = device::gpu();
+    let mut builder = Builder::new(Vec3::ZERO);
+    let water = builder.material(water());
+    let glow = builder.material(emitter(Vec3::ONE));
+    // Corners the other way round: fronts outside.
+    builder.room(Vec3::ONE, Vec3::NEG_ONE, [water; 6]);
+    builder.quad(Vec3::new(0.0, -0.5, 0.5), Vec3::X * 0.5, Vec3::Y, glow);
+    builder.quad(Vec3::new(-3.0, -3.0, -3.0), Vec3::X * 3.0, Vec3::Y * 6.0, glow);
+    builder.quad(Vec3::new(-20.0, 10.0, -20.0), Vec3::Z * 40.0, Vec3::X * 40.0, water);
+    builder.quad(Vec3::new(-20.0, 8.0, -20.0), Vec3::Z * 40.0, Vec3::X * 40.0, glow);
+    let scene = builder.build();
+    for (what, eye, target, metres) in [
+        ("in the box", Vec3::new(0.2, 0.1, 5.0), Vec3::new(0.2, 0.1, 0.0), 0.5),
+        ("behind the box", Vec3::new(-0.5, 0.1, 5.0), Vec3::new(-0.5, 0.1, 0.0), 2.0),
+        ("behind the box, from inside", Vec3::new(-0.5, 0.1, 0.25), Vec3::new(-0.5, 0.1, 0.0), 1.25),
+        ("below open water", Vec3::Y * 13.0, Vec3::Y * 9.0, 2.0),
+    ] {
+        assert_is(what, measure(&gpu, &scene, [eye, target], 8), 0.5f64.powf(metres));
+    }
+}
+
+/// A floor in a box of water, below a lamp in the same water, by every way of sampling; and below a light without size.
+#[test]
+fn lamps_in_a_medium_light_through_it() {
+    let gpu = device::gpu();
+    let in_water = |add_light: &dyn Fn(&mut Builder)| {
+        let mut builder = Builder::new(Vec3::ZERO);
+        let water = builder.material(water());
+        builder.room(Vec3::new(30.0, 3.0, 30.0), Vec3::new(-30.0, -1.0, -30.0), [water; 6]);
+        floor(&mut builder, 0.7);
+        add_light(&mut builder);
+        builder.build()
+    };
+    let eye = Vec3::Y * 8.0;
+    let to_the_floor = 0.5f64.powi(3);
+    let lamp = in_water(&|builder| {
+        let lamp = builder.material(emitter(Vec3::splat(3.0)));
+        builder.quad(Vec3::new(0.5, 1.5, -1.0), Vec3::X * 2.0, Vec3::Z * 2.0, lamp);
+    });
+    // By quadrature over the lamp.
+    const CELLS: u32 = 400;
+    let at = |i: u32| (f64::from(i) + 0.5) * 2.0 / f64::from(CELLS);
+    let area = (2.0 / f64::from(CELLS)).powi(2);
+    let irradiance_share: f64 = (0..CELLS * CELLS)
+        .map(|cell| {
+            let distance2 = (0.5 + at(cell % CELLS)).powi(2) + 1.5f64.powi(2) + (at(cell / CELLS) - 1.0).powi(2);
+            (1.5 / distance2).powi(2) / PI * area * 0.5f64.powf(distance2.sqrt())
+        })
+        .sum();
+    let expected = to_the_floor * 0.7 * 3.0 * irradiance_share;
+    for technique in [SamplingTechnique::Lights, SamplingTechnique::Bsdf, SamplingTechnique::Both] {
+        let value = measure_by(&gpu, &lamp, [eye, Vec3::ZERO], 2, (technique, COMPARED_SAMPLES));
+        assert_is(&format!("a lamp in water, {technique:?}"), value, expected);
+    }
+    let point = in_water(&|builder| {
+        builder.light(PunctualLight {
+            name: String::new(),
+            kind: PunctualKind::Point,
+            intensity: Vec3::splat(5.0),
+            position: Vec3::new(1.5, 2.0, 0.0),
+            rotation: Quat::IDENTITY,
+        });
+    });
+    let expected = to_the_floor * 0.7 / PI * 5.0 * 0.8 / 6.25 * 0.5f64.powf(2.5);
+    assert_is("a point in water", measure(&gpu, &point, [eye, Vec3::ZERO], 2), expected);
 }

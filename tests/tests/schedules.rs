@@ -54,7 +54,7 @@ fn renderer(gpu: &Gpu, case: &Case, schedule: Schedule) -> Renderer {
 }
 
 /// A hall with all that rays pass or may see: cut-outs, blended leaves, stacks of clear sheets, glass, lamps, punctual lights and
-/// an environment image behind a gap. One stack has more sheets than a batch has rounds.
+/// an environment image behind a gap. One stack has more sheets than a batch has rounds; one ball is in the absorbing glass of another.
 fn hall() -> Scene {
     let mut builder = Builder::new(Vec3::ZERO);
     let white = builder.material(lambert(Vec3::new(0.8, 0.75, 0.7)));
@@ -84,6 +84,8 @@ fn hall() -> Scene {
         roughness: 0.05,
         transmission: 1.0,
         thickness: 0.5,
+        attenuation_color: Vec3::new(0.2, 0.8, 0.4),
+        attenuation_distance: 0.5,
         ..Default::default()
     });
     builder.room(Vec3::new(-3.0, -1.5, -4.0), Vec3::new(3.0, 2.0, 3.0), [white, shiny, white, white, white, white]);
@@ -101,6 +103,7 @@ fn hall() -> Scene {
     };
     builder.place(sphere, glass, place(2.0, -0.8, 0.5, 0.6));
     builder.place(sphere, shiny, place(-2.0, -0.9, 0.0, 0.5));
+    builder.place(sphere, shiny, place(2.0, -0.8, 0.5, 0.2));
     let light = |kind, intensity, position| PunctualLight {
         name: String::new(),
         kind,
@@ -199,6 +202,7 @@ fn faults_of_the_wavefront_are_noticed() {
     let expected = device::trace(&mut renderer(&gpu, &case, Schedule::Megakernel), SAMPLES).unwrap();
     for (module, passage) in [
         ("wavefront::state", ("states[number].travelled = path.travelled;", "states[number].travelled = 0.0;")),
+        ("wavefront::state", ("states[number].medium = path.medium;", "states[number].medium = NONE;")),
         ("wavefront::queue", ("if place >= atomicLoad", "if place + 1u >= atomicLoad")),
     ] {
         let found = faulty(&gpu, module, passage);

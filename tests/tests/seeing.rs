@@ -52,6 +52,20 @@ fn painted_stops() -> Renderer {
     })
 }
 
+/// A pyramid of one pixel is finished like any other.
+#[test]
+fn a_view_of_one_pixel_shows_the_mean() {
+    let film = FilmOptions::perspective(1, 1, 0.5);
+    let radiance = Vec3::new(0.25, 0.5, 0.75);
+    let mut renderer = device::painted(&device::gpu(), film, |_, _| Some(radiance));
+    for fill in [false, true] {
+        readback::draw(&mut renderer, &ViewSettings { size: [1, 1], fill, ..as_it_is() }).unwrap();
+        let (_, texels) = renderer.presented_radiance().unwrap();
+        let shown = Vec3::new(texels[0][0], texels[0][1], texels[0][2]);
+        assert!((shown - radiance).abs().max_element() < 1e-4, "{shown}");
+    }
+}
+
 #[test]
 fn false_colour_is_the_tables_colour_of_the_exposed_luminance() {
     let mut renderer = painted_stops();

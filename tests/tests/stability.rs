@@ -10,9 +10,10 @@ use std::{f64::consts::PI, time::Instant};
 
 use fovea_tests::{
     device,
+    known::corner_form_factor,
     pencil::{Measured, measure},
     plant::{exchanged, instead_of_paths},
-    scenes::{self, Builder, corner_form_factor, emitter, lambert},
+    scenes::{self, Builder, emitter, lambert},
 };
 use glam::{Affine3A, Mat3A, Quat, Vec3};
 use tracer::{

@@ -45,6 +45,10 @@ features! {
     SpecularTextures = "SPECULAR_TEXTURES",
     /// Some material emits.
     Emission = "EMISSION",
+    /// Some material that emits has alpha mask or blend: light samples count by what is there.
+    EmissiveAlpha = "EMISSIVE_ALPHA",
+    /// Some material that emits has a clearcoat: what it sends depends on the direction.
+    CoatedEmission = "COATED_EMISSION",
     /// There are emissive triangles or punctual lights to sample.
     Lights = "LIGHTS",
     /// Some directional light has an angular size: rays that leave the scene may see it.
@@ -145,7 +149,7 @@ impl SceneFeatures {
     pub fn of(scene: &Scene) -> Self {
         let used = used_materials(scene);
         let any = |test: fn(&Material) -> bool| used.iter().any(|m| test(m));
-        let emits = any(|m| m.emission.max_element() > 0.0 && !m.unlit);
+        let emits = any(Material::emits);
         let samples_light = emits || !scene.lights.is_empty() || matches!(scene.environment, Environment::Image { .. });
         Self::default()
             .with(Feature::Alpha, any(|m| m.alpha_mode != AlphaMode::Opaque))
@@ -159,6 +163,8 @@ impl SceneFeatures {
                 any(|m| m.specular_texture.is_some() || m.specular_color_texture.is_some()),
             )
             .with(Feature::Emission, emits)
+            .with(Feature::EmissiveAlpha, any(|m| m.emits() && m.alpha_mode != AlphaMode::Opaque))
+            .with(Feature::CoatedEmission, any(|m| m.emits() && m.clearcoat > 0.0))
             .with(Feature::Lights, emits || !scene.lights.is_empty())
             .with(Feature::SunDiscs, scene.lights.iter().any(PunctualLight::is_disc))
             .with(Feature::EnvironmentImage, matches!(scene.environment, Environment::Image { .. }))

@@ -7,8 +7,8 @@
 //!   [`REBASE_RATIO`] times its diagonal, that centre becomes [`Scene::origin_in_file`] and all is stored relative to it;
 //!   otherwise coordinates stay the file's.
 //! - Winding is glTF's: front faces are counter-clockwise seen from outside, clockwise where `world_from_mesh` has a
-//!   negative determinant. Triangles are stored as in the file; the renderer flips the geometric normal by the sign of
-//!   the determinant.
+//!   negative determinant. Triangles are stored as in the file; the renderer takes geometric normals to the world as it
+//!   does vertex normals, so that the front stays in front.
 //! - Skins and morph targets are baked at the file's own pose or at [`ImportOptions::time_secs`].
 //! - Missing normals become flat ones; missing tangents are made by MikkTSpace where a material needs them.
 //! - A missing or undecodable image becomes one neutral texel (black for emission, flat for normals, else white).

@@ -204,7 +204,7 @@ pub enum AlphaMode {
     Opaque,
     /// Present where alpha is at least the cutoff.
     Mask {
-        /// In 0..=1.
+        /// At least 0; above 1 nothing is present.
         cutoff: f32,
     },
     /// Alpha is the fraction of light that the surface stops.
@@ -373,6 +373,11 @@ impl Material {
     pub fn is_clear_sheet(&self) -> bool {
         // The square of the roughness counts as 0 below 1e-3 in the shaders.
         self.transmission > 0.0 && !self.is_solid() && self.roughness * self.roughness < 1e-3
+    }
+
+    /// True when it is a light; what is unlit shows its base colour alone.
+    pub fn emits(&self) -> bool {
+        self.emission.max_element() > 0.0 && !self.unlit
     }
 
     /// True when something is mirrored: metal, or a dielectric whose specular reflectance is not 0.

@@ -221,8 +221,9 @@ impl ViewRenderer {
         loop {
             self.levels.push(Level { size: level, offset });
             offset = (offset + level[0] * level[1]).next_multiple_of(LEVEL_ALIGNMENT);
-            // The last level is one pixel: as long as there is one sample, no part of the view is without a value.
-            if level[0].max(level[1]) <= 1 {
+            // The last level is one pixel: as long as there is one sample, no part of the view is without a value. A view of one pixel
+            // has another, since levels are finished from the next coarser one.
+            if level[0].max(level[1]) <= 1 && self.levels.len() > 1 {
                 break;
             }
             level = [level[0].div_ceil(2), level[1].div_ceil(2)];
@@ -396,7 +397,7 @@ impl ViewRenderer {
         }
         let texels = self.levels.last().map_or(0, |level| u64::from(level.offset) + pixels(level.size));
         let known = self.hits.as_ref().filter(|hits| hits.rows == settings.size[1]).map(|hits| hits.of);
-        match known.filter(|_| settings.uses_guides() && self.levels.len() > 1) {
+        match known.filter(|_| settings.uses_guides()) {
             None => self.guides = None,
             Some(of) if self.guides.as_ref().is_some_and(|guides| guides.of == of) => {}
             Some(of) => self.guides = Some(Guides::new(&self.gpu, texels, of)),

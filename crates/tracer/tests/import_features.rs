@@ -411,8 +411,16 @@ fn all_material_extensions_are_read() {
 #[test]
 fn values_out_of_range_are_clamped_and_reported() {
     let mut file = File::triangle();
-    file.material(json!({"pbrMetallicRoughness": {"roughnessFactor": 1.5, "metallicFactor": -1}, "extensions": {"KHR_materials_ior": {"ior": 0}}}));
+    file.material(json!({
+        "pbrMetallicRoughness": {"roughnessFactor": 1.5, "metallicFactor": -1}, "alphaMode": "MASK", "alphaCutoff": 1.5,
+        "extensions": {"KHR_materials_ior": {"ior": 0}},
+    }));
     let (scene, report) = file.load().unwrap();
+    assert_eq!(
+        scene.materials[0].alpha_mode,
+        AlphaMode::Mask { cutoff: 1.5 },
+        "above 1 nothing is present, as specified"
+    );
     assert_eq!((scene.materials[0].roughness, scene.materials[0].metallic), (1.0, 0.0));
     let f0 = ((scene.materials[0].ior - 1.0) / (scene.materials[0].ior + 1.0)).powi(2);
     assert!(f0 > 0.999, "an ior of 0 means total reflection");

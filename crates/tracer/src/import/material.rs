@@ -60,7 +60,7 @@ impl Reader<'_, '_> {
             m.emission *= self.at_least(&strength, "emissiveStrength", 1.0, 0.0)?;
         }
         m.alpha_mode = match o.string("alphaMode")? {
-            Some("MASK") => AlphaMode::Mask { cutoff: self.unit(o, "alphaCutoff", 0.5)? },
+            Some("MASK") => AlphaMode::Mask { cutoff: self.at_least(o, "alphaCutoff", 0.5, 0.0)? },
             Some("BLEND") => AlphaMode::Blend,
             None | Some("OPAQUE") => AlphaMode::Opaque,
             Some(other) => {

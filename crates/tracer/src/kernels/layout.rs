@@ -133,7 +133,7 @@ shared! {
         hit_instance: u32,
         hit_barycentrics: [f32; 2],
         hit_triangle: u32,
-        pad_0: u32,
+        medium: u32,
     }
 
     /// Which queue a kernel of the wavefront schedule reads and which one it appends to.

@@ -7,15 +7,17 @@ use glam::Vec3;
 use super::{AliasTable, UploadError, lights::luminance, upload_image};
 use crate::{gpu::Gpu, scene::EnvironmentImage};
 
-/// Cells of the importance grid at most, along x and y.
+/// Cells of the importance grid at most, along x and y. Their numbers are floats in its texture: as an integer's bits they would be
+/// denormal ones, which drivers may take for 0.
 const MOST_CELLS: [u32; 2] = [1024, 512];
+const _: () = assert!(MOST_CELLS[0] * MOST_CELLS[1] <= 1 << 23, "the kernels read whole numbers up to 2^23");
 
 /// An environment image and its grid on the device.
 #[derive(Debug)]
 pub struct EnvironmentOnGpu {
     /// The image, or one black texel.
     pub image: wgpu::TextureView,
-    /// The grid: density per unit of the unit square, alias threshold, alias index (its bits); or one texel.
+    /// The grid: density per unit of the unit square, alias threshold, alias index; or one texel.
     pub cells: wgpu::TextureView,
     /// Its size; zero for a constant environment.
     pub cells_size: [u32; 2],
@@ -78,7 +80,7 @@ fn importance_grid(image: &EnvironmentImage) -> (Vec<[f32; 4]>, [u32; 2]) {
     let table = AliasTable::build(&weights);
     let count = weights.len() as f32;
     let cells = (0..weights.len())
-        .map(|i| [table.probabilities[i] * count, table.thresholds[i], f32::from_bits(table.aliases[i]), 0.0])
+        .map(|i| [table.probabilities[i] * count, table.thresholds[i], table.aliases[i] as f32, 0.0])
         .collect();
     (cells, size)
 }
@@ -89,4 +91,27 @@ fn pixel_span(cell: u32, cells: u32, pixels: u32) -> std::ops::RangeInclusive<i6
     let first = (f64::from(cell) * scale - 0.5).floor() as i64;
     let last = (f64::from(cell + 1) * scale + 0.5).floor() as i64;
     first..=last.max(first)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::ContentHash;
+
+    /// Aliases are numbers, none of them denormal, and rows add up to the density.
+    #[test]
+    fn cells_hold_their_aliases_as_numbers() {
+        let pixels: Vec<[f32; 3]> = (0..64 * 32).map(|i| [(i % 29) as f32 + 0.1; 3]).collect();
+        let image = EnvironmentImage { width: 64, height: 32, hash: ContentHash::of(&[]), pixels };
+        let (cells, _) = importance_grid(&image);
+        let mut mass = vec![0.0f32; cells.len()];
+        for (i, &[_, threshold, alias, _]) in cells.iter().enumerate() {
+            assert!(alias == alias.round() && (alias == 0.0 || alias.is_normal()), "{alias}");
+            mass[i] += threshold;
+            mass[alias as usize] += 1.0 - threshold;
+        }
+        for (&[density, ..], mass) in cells.iter().zip(mass) {
+            assert!((density - mass).abs() <= 1e-4 * density, "{mass} instead of {density}");
+        }
+    }
 }

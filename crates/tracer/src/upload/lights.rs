@@ -1,13 +1,13 @@
 //! The light table: every emissive triangle and punctual light, weighted by power.
 
-use std::collections::{HashMap, hash_map::Entry};
+use std::collections::HashMap;
 
 use glam::Vec3;
 
 use super::{AliasTable, geometry::Shapes, placement::Placement};
 use crate::{
     kernels::layout::{self, codes},
-    scene::{PunctualKind, PunctualLight, Scene, Texture},
+    scene::{AlphaMode, Material, PunctualKind, PunctualLight, Scene, Texture},
 };
 
 /// What a light without extent makes of a surface, over its intensity: with the 16 that a film holds beyond the brightest radiance,
@@ -27,14 +27,14 @@ impl LightTable {
     pub(super) fn build(scene: &Scene, shapes: &Shapes, placement: &mut Placement) -> Self {
         let mut lights = Vec::new();
         let mut powers = Vec::new();
-        let mut twins = Twins::default();
+        let mut sites = Vec::new();
         let mut brightest: f32 = 0.0;
         let mut means: HashMap<u32, Vec3> = HashMap::new();
         for (index, source) in placement.sources.iter().enumerate() {
             let Some(source) = *source else { continue };
             let instance = &scene.instances[source as usize];
             let material = &scene.materials[instance.material as usize];
-            if material.emission.max_element() <= 0.0 || material.unlit {
+            if !material.emits() {
                 continue;
             }
             placement.instances[index].first_light = lights.len() as u32;
@@ -45,7 +45,8 @@ impl LightTable {
             });
             let sides = if material.double_sided { 2.0 } else { 1.0 };
             // Black texels in a dark texture still must be reachable where its mean is not zero elsewhere.
-            let radiance = f64::from(luminance(material.emission * mean.max(Vec3::splat(1e-4)))) * sides;
+            let radiance =
+                f64::from(luminance(material.emission * mean.max(Vec3::splat(1e-4))) * most_coverage(material)) * sides;
             let mesh = &scene.meshes[instance.mesh as usize];
             let is_mirrored = instance.world_from_mesh.matrix3.determinant() < 0.0;
             for triangle in &mesh.triangles {
@@ -56,8 +57,8 @@ impl LightTable {
                 }
                 let (edge_1, edge_2) = (b - a, c - a);
                 let two_areas = edge_1.as_dvec3().cross(edge_2.as_dvec3()).length();
-                let is_twin = twins.enter([a, b, c], material.double_sided, lights.len());
-                powers.push(if is_twin { 0.0 } else { radiance * std::f64::consts::PI * 0.5 * two_areas });
+                sites.push(Site { corners: [a, b, c], double_sided: material.double_sided });
+                powers.push(radiance * std::f64::consts::PI * 0.5 * two_areas);
                 lights.push(layout::Light {
                     position: a.to_array(),
                     edge_1: edge_1.to_array(),
@@ -69,7 +70,7 @@ impl LightTable {
                 });
             }
         }
-        if scene.materials.iter().any(|m| m.emissive_texture.is_some()) {
+        if scene.materials.iter().any(|m| m.emits() && varies(m)) {
             enter_triangles(shapes, placement, &mut lights);
         }
         let reach = scene.bounds().map_or(1.0, |(low, high)| f64::from((high - low).length()) * 0.5);
@@ -83,53 +84,79 @@ impl LightTable {
             powers.push(punctual_power(light, reach));
             lights.push(encoded);
         }
+        let twins = twins(&sites);
+        for &(twin, _) in &twins {
+            powers[twin] = 0.0;
+        }
         let table = AliasTable::build(&powers);
         for (i, light) in lights.iter_mut().enumerate() {
             light.probability = table.probabilities[i];
             light.alias_threshold = table.thresholds[i];
             light.alias_index = table.aliases[i];
         }
-        for &(twin, first) in &twins.pairs {
+        for (twin, first) in twins {
             lights[twin].probability = lights[first].probability;
         }
         Self { lights, brightest }
     }
 }
 
-/// Emissive triangles in the same place, facing the same way. A ray sees one of them, so only the first is sampled; the
-/// others have its density, since a ray may hit any of them.
-#[derive(Default)]
-struct Twins {
-    firsts: HashMap<[[u32; 3]; 3], usize>,
-    /// Twin and first.
-    pairs: Vec<(usize, usize)>,
+/// Where an emissive triangle stands.
+struct Site {
+    corners: [Vec3; 3],
+    double_sided: bool,
 }
 
-impl Twins {
-    /// Whether light `index` stands where an earlier one does.
-    fn enter(&mut self, corners: [Vec3; 3], double_sided: bool, index: usize) -> bool {
-        let mut key = corners.map(|corner| corner.to_array().map(f32::to_bits));
-        if double_sided {
-            key.sort_unstable();
-        } else {
-            // The order of the corners says which side is the front.
-            let first = (0..3).min_by_key(|&i| key[i]).unwrap_or(0);
-            key.rotate_left(first);
+impl Site {
+    /// Bits of the corners in ascending order, and whether it is an even permutation of them: which side the front is on.
+    fn place(&self) -> ([[u32; 3]; 3], bool) {
+        // Adding 0 makes one of both zeros; a mirror makes the negative one.
+        let mut corners = self.corners.map(|corner| (corner + Vec3::ZERO).to_array().map(f32::to_bits));
+        let first = (0..3).min_by_key(|&i| corners[i]).unwrap_or(0);
+        corners.rotate_left(first);
+        let is_even = corners[1] <= corners[2];
+        if !is_even {
+            corners.swap(1, 2);
         }
-        match self.firsts.entry(key) {
-            Entry::Vacant(vacant) => {
-                vacant.insert(index);
-                false
-            }
-            Entry::Occupied(first) => {
-                self.pairs.push((index, *first.get()));
-                true
-            }
-        }
+        (corners, is_even)
     }
 }
 
-/// Tells each light the triangle whose texture coordinates it has. A mesh that is placed often lends its copies one.
+/// Twin and first of emissive triangles in the same place that emit to the same side. A ray sees one of them, so only the first is
+/// sampled; the others have its density, since a ray may hit any of them. One that emits to both sides is the first of all.
+fn twins(sites: &[Site]) -> Vec<(usize, usize)> {
+    let mut firsts = HashMap::new();
+    let mut pairs = Vec::new();
+    let (both, one): (Vec<usize>, Vec<usize>) = (0..sites.len()).partition(|&site| sites[site].double_sided);
+    for index in both.into_iter().chain(one) {
+        let (place, is_even) = sites[index].place();
+        let side = (!sites[index].double_sided).then_some(is_even);
+        match firsts.get(&(place, None)).or_else(|| firsts.get(&(place, side))) {
+            Some(&first) => pairs.push((index, first)),
+            None => {
+                firsts.insert((place, side), index);
+            }
+        }
+    }
+    pairs
+}
+
+/// Whether what a point of the material emits depends on more than the material.
+fn varies(material: &Material) -> bool {
+    material.emissive_texture.is_some() || material.alpha_mode != AlphaMode::Opaque || material.clearcoat > 0.0
+}
+
+/// The most of an emitter that is there at any of its points: textures and vertices only take from it.
+fn most_coverage(material: &Material) -> f32 {
+    let alpha = material.base_color.w;
+    match material.alpha_mode {
+        AlphaMode::Opaque => 1.0,
+        AlphaMode::Blend => alpha,
+        AlphaMode::Mask { cutoff } => f32::from(u8::from(alpha >= cutoff)),
+    }
+}
+
+/// Tells each light the triangle whose vertices it has. A mesh that is placed often lends its copies one.
 fn enter_triangles(shapes: &Shapes, placement: &Placement, lights: &mut [layout::Light]) {
     let mut entries: Vec<(u32, u32)> = Vec::new();
     for (index, instance) in placement.instances.iter().enumerate() {

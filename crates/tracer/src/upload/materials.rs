@@ -46,7 +46,7 @@ fn encode_one(m: &Material, mut slot: impl FnMut(Option<&TextureRef>) -> u32) ->
         roughness: m.roughness,
         ior: m.ior,
         transmission: m.transmission,
-        alpha_cutoff: if let AlphaMode::Mask { cutoff } = m.alpha_mode { cutoff } else { 0.0 },
+        alpha_cutoff: if let AlphaMode::Mask { cutoff } = m.alpha_mode { encode_cutoff(cutoff) } else { 0.0 },
         normal_scale: m.normal_scale,
         base_color_texture: slot(m.base_color_texture.as_ref()),
         metallic_roughness_texture: slot(m.metallic_roughness_texture.as_ref()),
@@ -80,6 +80,11 @@ fn encode_one(m: &Material, mut slot: impl FnMut(Option<&TextureRef>) -> u32) ->
         iridescence_thickness_texture: slot(m.iridescence_thickness_texture.as_ref()),
         pad_0: [0; 3],
     }
+}
+
+/// Interpolation rounds: an alpha that equals the cutoff must not fall below it. Above 1 all is cut out.
+fn encode_cutoff(cutoff: f32) -> f32 {
+    if cutoff > 1.0 { 2.0 } else { cutoff * (1.0 - 1e-6) }
 }
 
 /// Beer-Lambert coefficient per metre: after `attenuation_distance` white has become `attenuation_color`.
