@@ -131,15 +131,15 @@ fn a_small_study_leaves_all_its_outputs_and_goes_on_from_them() {
     assert_eq!(summary["settings"]["builtin"]["film"], serde_json::json!([64, 32]));
 
     // One ratio of the summary, from the raw rows.
-    let found = &summary["sights"][0]["ratios"]["fv_over_od"];
+    let found = &summary["sights"][0]["ratios"]["fv_over_vp"];
     assert_eq!(summary["sights"][0]["gaze"], "0_0");
-    let (od, fv) = (curve(&rows, "od"), curve(&rows, "fv"));
-    let from_od = od.iter().filter_map(|&(n, e)| Some((n / samples_at(&fv, e)?).ln()));
-    let from_fv = fv.iter().filter_map(|&(n, e)| Some((samples_at(&od, e)? / n).ln()));
-    let logs: Vec<f64> = from_od.chain(from_fv).collect();
+    let (vp, fv) = (curve(&rows, "vp"), curve(&rows, "fv"));
+    let from_vp = vp.iter().filter_map(|&(n, e)| Some((n / samples_at(&fv, e)?).ln()));
+    let from_fv = fv.iter().filter_map(|&(n, e)| Some((samples_at(&vp, e)? / n).ln()));
+    let logs: Vec<f64> = from_vp.chain(from_fv).collect();
     let samples = (logs.iter().sum::<f64>() / logs.len() as f64).exp();
     let rates = std::fs::read_to_string(folder.join("rates.csv")).unwrap();
-    let rate = seconds_a_sample(&rates, "od") / seconds_a_sample(&rates, "fv");
+    let rate = seconds_a_sample(&rates, "vp") / seconds_a_sample(&rates, "fv");
     let near = |found: &Value, expected: f64| {
         assert!((found.as_f64().unwrap() / expected - 1.0).abs() < 1e-9, "{found} instead of {expected}");
     };
