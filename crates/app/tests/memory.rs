@@ -262,9 +262,13 @@ fn scratch(name: &str) -> PathBuf {
 
 fn open(loader: &Loader, path: &std::path::Path) -> Loaded {
     loader.open(Source::File(path.to_owned()));
-    match wait(loader) {
-        LoadEvent::Opened(_, loaded) => loaded,
-        other => panic!("{other:?}"),
+    loop {
+        match wait(loader) {
+            LoadEvent::Opened(_, loaded) => return loaded,
+            // Nobody sketches here.
+            LoadEvent::Shapes(..) => {}
+            other => panic!("{other:?}"),
+        }
     }
 }
 
