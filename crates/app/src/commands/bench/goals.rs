@@ -92,7 +92,8 @@ pub fn text(raw: &Value) -> String {
                 |what: &str| middle(&Value::Array(rows(found, state).iter().map(|run| run[what].clone()).collect()));
             let [sketch, traced] = ["until_sketch_s", "process_s"].map(until);
             let goal = format!("process start to first picture, {name}, kernels {state}: at most {limit:.1} s");
-            let found = format!("{sketch:.2} s for a grey sketch of first hits, {traced:.2} s for one that is path-traced");
+            let found =
+                format!("{sketch:.2} s for a grey sketch of first hits, {traced:.2} s for one that is path-traced");
             line(&goal, found, sketch <= limit);
         }
     }
