@@ -119,7 +119,7 @@ impl Bench {
 
     /// Histogram of sampled directions and mean weights: one pixel a bin, `samples` a case. Delta samples are left out.
     pub fn sample(&self, gpu: &Gpu, plant: impl Fn(&ShaderSources) -> ShaderSources, samples: u32) -> Vec<FilmPixel> {
-        let body = "    let next = sample_bsdf(c.b, c.wo, u.xy);
+        let body = "    let next = sample_bsdf(c.b, c.wo, u);
     if next.is_valid && !next.is_delta {
         pixel = case_index * BINS + bin_of(next.direction);
         radiance = next.weight;
@@ -144,7 +144,7 @@ impl Bench {
     /// Mean weight of samples, 0 for those that fail: the albedo in each case of the first `channels` channels, a pixel each.
     pub fn furnace(&self, gpu: &Gpu, samples: u32, channels: u32) -> Vec<FilmPixel> {
         let body = format!(
-            "    let next = sample_bsdf(c.b, c.wo, u.xy);
+            "    let next = sample_bsdf(c.b, c.wo, u);
     let channel = part % {channels}u;
     pixel = case_index * {channels}u + channel;
     let weight = select(next.weight.x, select(next.weight.y, next.weight.z, channel == 2u), channel > 0u);
