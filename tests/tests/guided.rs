@@ -226,7 +226,7 @@ fn samples_of_a_film_that_is_coarser_than_the_view_count_once() {
     expose(&mut renderer, &even(SIZE[0] * SIZE[1] / 16), 0.2, |_| 8);
     let noise = |renderer: &mut Renderer| error(&shown(renderer, &settings(true)), &even(SIZE[0] * SIZE[1]));
     let once = noise(&mut renderer);
-    plant(&mut renderer, "view::gather", ("weight *= footprint.share;", ""));
+    plant(&mut renderer, "view::gather", ("sum *= footprint.share;\n        squares *= footprint.share;", ""));
     let often = noise(&mut renderer);
     eprintln!("noise of an even wall: {once:.3}; with its samples counted by each pixel {often:.3}");
     assert!(once < 0.25 * often, "{once}, {often}");

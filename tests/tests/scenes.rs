@@ -194,11 +194,14 @@ fn punctual_lights() {
     // Near a lamp it is far brighter than at a metre: the film holds that.
     let mut builder = Builder::new(Vec3::ZERO);
     floor(&mut builder, 0.4);
-    let position = target + Vec3::new(0.0, 0.02, 0.0);
+    let position = target + Vec3::new(0.0, 0.05, 0.0);
     let (name, kind, intensity) = (String::new(), PunctualKind::Point, Vec3::splat(5.0));
     builder.light(PunctualLight { name, kind, intensity, position, rotation });
-    let value = measure(&gpu, &builder.build(), [Vec3::new(-3.0, 2.0, 0.0), target], 1);
-    assert_is("two centimetres below a lamp", value, 0.4 / PI * 5.0 / (0.02 * 0.02));
+    let (near, _) = measure(&gpu, &builder.build(), [Vec3::new(-3.0, 2.0, 0.0), target], 1);
+    let expected = 0.4 / PI * 5.0 / (0.05 * 0.05);
+    eprintln!("five centimetres below a lamp: {near:.3}, expected {expected:.3}");
+    // Shadow rays begin up to two micrometres nearer to the lamp.
+    assert!((near / expected - 1.0).abs() < 1e-4);
     // Beside the outer cone there is nothing.
     let mut builder = Builder::new(Vec3::ZERO);
     floor(&mut builder, 0.4);
