@@ -3,8 +3,8 @@
 
 use std::sync::{Arc, atomic::AtomicBool};
 
-use fovea_tests::device;
-use glam::{Quat, Vec3};
+use fovea_tests::{device, plant::exchanged, scenes};
+use glam::{Affine3A, Quat, Vec3};
 use tracer::{
     builtin,
     distribution::Distribution,
@@ -22,7 +22,8 @@ fn renderer(gpu: &Gpu, scene: &Scene) -> Renderer {
     let options = RendererOptions { film: FILM, max_bounces: 3, ..Default::default() };
     let mut renderer = Renderer::new(gpu, &options, Distribution::omnidirectional(device::inverse())).unwrap();
     renderer.set_scene(scene).unwrap();
-    renderer.set_pose(FilmPose { position: scene.cameras[0].position, world_from_film: Quat::IDENTITY });
+    let position = scene.cameras.first().map_or(Vec3::ZERO, |camera| camera.position);
+    renderer.set_pose(FilmPose { position, world_from_film: Quat::IDENTITY });
     renderer
 }
 
@@ -124,6 +125,63 @@ fn a_move_uploads_the_object_and_places_alone() {
     scene.instances[other].world_from_mesh.translation.x += 0.01;
     edited.set_scene(&scene).unwrap();
     assert_eq!(edited.key(Kernel::Trace), kernel, "the second object compiles a kernel");
+}
+
+/// Tables have room for an object that moves, which is then written into them; for a larger one they become larger.
+#[test]
+fn an_object_that_moves_goes_into_the_room_of_the_tables() {
+    let _time = device::Stopwatch::start("edits");
+    for place in [GeometryPlace::Buffers, GeometryPlace::Textures] {
+        let gpu = device::gpu().with_geometry_in(place);
+        let mut builder = scenes::Builder::new(Vec3::ONE);
+        let white = builder.material(scenes::lambert(Vec3::splat(0.8)));
+        for (rings, x) in [(64, -2.5), (12, 0.0), (40, 2.5)] {
+            let sphere = builder.sphere(rings);
+            builder.place(sphere, white, Affine3A::from_translation(Vec3::new(x, 0.0, -4.0)));
+        }
+        let mut scene = builder.build();
+        let [whole, small, large] = [0, 1, 2].map(|i| triangles(&scene, i));
+        assert!(small * 20 < whole && large * 5 > whole, "{whole} {small} {large}");
+        let mut edited = renderer(&gpu, &scene);
+        let mut bytes = edited.set_scene(&scene).unwrap().upload.geometry_bytes;
+        for (moved, finds_room) in [(1, true), (1, true), (2, false), (1, true), (2, true)] {
+            scene.instances[moved].world_from_mesh.translation.y += 0.3;
+            let after = edited.set_scene(&scene).unwrap().upload.geometry_bytes;
+            eprintln!("{place:?}: {bytes} bytes, {after} after object {moved} has moved");
+            assert_eq!(after == bytes, finds_room);
+            bytes = after;
+            let (off, mean_off) = difference(&picture(&mut renderer(&gpu, &scene)), &picture(&mut edited));
+            assert!(mean_off < 1e-3 && off < 0.1, "object {moved}: not the picture of a fresh renderer");
+        }
+    }
+}
+
+/// An edit that is refused leaves the scene as it was, though its tables are those that the edit is to be written into.
+#[test]
+fn an_edit_that_does_not_compile_changes_nothing() {
+    let _time = device::Stopwatch::start("edits");
+    for place in [GeometryPlace::Buffers, GeometryPlace::Textures] {
+        let gpu = device::gpu().with_geometry_in(place);
+        let (scene, _) = builtin::scene().unwrap();
+        let mut edited = renderer(&gpu, &scene);
+        let before = picture(&mut edited);
+        let whole = edited.shaders().clone();
+        // What the first move needs and nothing does before.
+        let loop_over_entries = "while instance == NONE && primitive_group.y != 0u {";
+        let faulty = exchanged(&whole, "scene::traverse", &[(loop_over_entries, "while instance == 1.5 {")]);
+        edited.set_shaders(faulty).unwrap();
+        let mut moved = scene.clone();
+        moved.instances[at_the_centre(&mut edited, &scene).0].world_from_mesh.translation.y += 0.3;
+        let error = edited.set_scene(&moved).unwrap_err().to_string();
+        eprintln!("{place:?}: {error}");
+        edited.restart();
+        assert_eq!(picture(&mut edited).words, before.words, "the refused move is to be seen");
+
+        edited.set_shaders(whole).unwrap();
+        edited.set_scene(&moved).unwrap();
+        let (off, mean_off) = difference(&picture(&mut renderer(&gpu, &moved)), &picture(&mut edited));
+        assert!(mean_off < 1e-3 && off < 0.1, "not the picture of a fresh renderer");
+    }
 }
 
 /// What happens, and how.

@@ -126,3 +126,26 @@ fn what_is_traced_after_a_sketch_is_what_is_traced_without_one() {
         assert!(films[0].words == films[1].words && films[0].pixels().any(|pixel| pixel.samples > 0));
     }
 }
+
+/// The sketch of another version is not written into the tables of the scene that is traced.
+#[test]
+fn a_sketch_beside_a_scene_leaves_it_as_it_is() {
+    let mut builder = scenes::Builder::new(Vec3::ONE);
+    let plain = builder.material(scenes::lambert(PLAIN));
+    // The smaller one finds room in the tables when it moves.
+    for (rings, centre) in [60, 8].into_iter().zip(CENTRES) {
+        let sphere = builder.sphere(rings);
+        builder.place(sphere, plain, Affine3A::from_translation(centre));
+    }
+    let scene = builder.build();
+    let mut moved = scene.clone();
+    moved.instances[1].world_from_mesh.translation.y += 1.0;
+    let film = |sketched_first: &[&Scene]| {
+        let mut renderer = renderer();
+        renderer.set_scene(&scene).unwrap();
+        let sketches: Vec<_> = sketched_first.iter().map(|scene| sketched(&mut renderer, scene)).collect();
+        assert!(sketches.windows(2).all(|pair| pair[0] != pair[1]), "the move is not to be seen");
+        device::trace(&mut renderer, 1 << 13).unwrap().words
+    };
+    assert!(film(&[]) == film(&[&scene, &moved]));
+}

@@ -231,9 +231,20 @@ impl Gpu {
 
     /// A buffer with contents, of which there must be some. On a lost device it is a dead one.
     pub(crate) fn buffer(&self, label: &str, contents: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        self.buffer_with_room(label, contents, contents.len() as u64, usage)
+    }
+
+    /// A buffer that begins with contents, with zeros up to `size` bytes.
+    pub(crate) fn buffer_with_room(
+        &self,
+        label: &str,
+        contents: &[u8],
+        size: u64,
+        usage: wgpu::BufferUsages,
+    ) -> wgpu::Buffer {
         let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
-            size: (contents.len() as u64).next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT),
+            size: size.next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT),
             usage,
             mapped_at_creation: true,
         });

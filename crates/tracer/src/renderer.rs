@@ -210,18 +210,20 @@ impl Renderer {
     /// # Errors
     /// When the scene does not fit the device or a kernel does not compile; the last scene then stays.
     pub fn set_scene(&mut self, scene: &Scene) -> Result<SceneReport, RenderError> {
-        let uploaded = SceneOnGpu::upload(&self.gpu, scene, &mut self.cache)?;
+        let (uploaded, edit) = SceneOnGpu::upload(&self.gpu, scene, &mut self.cache)?;
         let upload = uploaded.report;
         let before = self.scene.replace(uploaded);
         let started = Instant::now();
         if let Err(error) = self.bind().and_then(|()| self.warm_up()) {
             self.scene = before;
             self.bound = None;
+            self.cache.forget_device();
             if self.scene.is_some() {
                 self.bind()?;
             }
             return Err(error);
         }
+        edit.write(&self.gpu);
         let kernel_compile_secs = started.elapsed().as_secs_f64();
         self.scene_hash = scene.content_hash();
         self.scene_version += 1;

@@ -36,6 +36,7 @@ pub use cache::SceneCache;
 use pages::Pages;
 use placed::Placed;
 pub(crate) use sketch::SketchOnGpu;
+pub use tables::Edit;
 use tables::Tables;
 
 /// Why a scene cannot go to the device.
@@ -151,32 +152,6 @@ impl Uploader<'_> {
         Ok(self.gpu.buffer(what, contents, usage))
     }
 
-    /// The `head` bytes at the start of a buffer, with more from byte `at` on.
-    fn appended<T: bytemuck::NoUninit>(
-        &mut self,
-        what: &'static str,
-        (start, head): (&wgpu::Buffer, u64),
-        (at, tail): (u64, &[T]),
-    ) -> Result<wgpu::Buffer, UploadError> {
-        let tail: &[u8] = bytemuck::cast_slice(tail);
-        let size = at + tail.len() as u64;
-        self.check(what, size)?;
-        self.count_new(tail.len() as u64);
-        let buffer = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(what),
-            size,
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
-            mapped_at_creation: false,
-        });
-        self.gpu.queue.write_buffer(&buffer, at, tail);
-        if head > 0 {
-            let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-            encoder.copy_buffer_to_buffer(start, 0, &buffer, 0, head);
-            self.gpu.queue.submit([encoder.finish()]);
-        }
-        Ok(buffer)
-    }
-
     fn check(&self, what: &'static str, bytes: u64) -> Result<(), UploadError> {
         let limit = self.gpu.largest_binding();
         if bytes <= limit {
@@ -190,14 +165,13 @@ impl Uploader<'_> {
         if self.gpu.lacks_memory(bytes) { Err(self.out_of_memory(what, bytes)) } else { Ok(()) }
     }
 
-    /// Finds out whether the device took all that was handed over; nothing of it stays in `cache` if not.
-    fn settle(&self, complaints: Complaints, cache: &mut SceneCache) -> Result<(), UploadError> {
+    /// Finds out whether the device took all that was handed over.
+    fn settle(&self, complaints: Complaints) -> Result<(), UploadError> {
         let Some(error) = complaints.end() else { return Ok(()) };
         // Then all is refused, and noticed by whoever waits for the device.
         if self.gpu.is_lost() {
             return Ok(());
         }
-        *cache = SceneCache::new(cache.hierarchy());
         Err(match error {
             wgpu::Error::OutOfMemory { .. } => self.out_of_memory("buffers and textures", self.device_bytes),
             error => UploadError::Refused { cause: error.to_string() },
@@ -243,17 +217,23 @@ fn upload_image(gpu: &Gpu, label: &str, [width, height]: [u32; 2], texels: &[[f3
 }
 
 impl SceneOnGpu {
-    /// Builds and uploads what is not in `cache` since an earlier version of the scene.
+    /// Builds and uploads what is not in `cache` since an earlier version of the scene, but for an edit of tables that this version
+    /// shares with the last one: once it is written, the last version can no longer be traced. If it is not to be written, the cache
+    /// must [forget](SceneCache::forget_device) it.
     ///
     /// # Errors
     /// When a part exceeds the adapter's limits or its memory.
-    pub fn upload(gpu: &Gpu, scene: &Scene, cache: &mut SceneCache) -> Result<Self, UploadError> {
+    pub fn upload(gpu: &Gpu, scene: &Scene, cache: &mut SceneCache) -> Result<(Self, Edit), UploadError> {
+        Self::try_upload(gpu, scene, cache).inspect_err(|_| cache.forget_device())
+    }
+
+    fn try_upload(gpu: &Gpu, scene: &Scene, cache: &mut SceneCache) -> Result<(Self, Edit), UploadError> {
         let started = Instant::now();
         let complaints = Complaints::of(&gpu.device);
         let mut uploader = Uploader { gpu, device_bytes: 0, uploaded_bytes: 0 };
         let mut placed = Placed::upload(scene, cache, &mut uploader)?;
         let shapes_secs = started.elapsed().as_secs_f64();
-        let light_table = lights::LightTable::build(scene, &placed.shapes.shapes, &mut placed.placement);
+        let light_table = lights::LightTable::build(scene, &placed.shapes, &mut placed.placement);
         let texels = cache.texels(scene, &mut uploader)?;
         let (materials, slots) = materials::encode(scene, &texels.offsets);
         let environment = cache.environment(&scene.environment, &mut uploader)?;
@@ -263,13 +243,13 @@ impl SceneOnGpu {
         // Lights without power are none.
         let features = features.without(Feature::Lights, light_table.lights.is_empty());
         let features = features.union(placed.features(cache.hierarchy()));
-        let Placed { shapes, placement, tables } = placed;
-        let geometry_bytes = tables.bytes();
-        let ([nodes, positions, triangles, vertices], geometry) = match tables {
-            Tables::Buffers(buffers) => (buffers, None),
+        let Placed { shapes, placement, edit } = placed;
+        let geometry_bytes = edit.tables().bytes();
+        let ([nodes, positions, triangles, vertices], geometry) = match edit.tables() {
+            Tables::Buffers(buffers) => (buffers.clone(), None),
             Tables::Textures(tables) => {
                 let none = uploader.storage::<u32>("no geometry", &[])?;
-                (std::array::from_fn(|_| none.clone()), Some(tables.map(|pages: Pages| pages.view)))
+                (std::array::from_fn(|_| none.clone()), Some(tables.each_ref().map(|pages: &Pages| pages.view.clone())))
             }
         };
         let buffers = [
@@ -282,7 +262,7 @@ impl SceneOnGpu {
             cache.table("texture slots", &slots, &mut uploader)?,
             cache.table("lights", &light_table.lights, &mut uploader)?,
         ];
-        uploader.settle(complaints, cache)?;
+        uploader.settle(complaints)?;
 
         let light_count = light_table.lights.len() as u32;
         let backdrop = scene.backdrop.color();
@@ -293,7 +273,7 @@ impl SceneOnGpu {
                 (Vec3::splat(*intensity), rotation_deg / 360.0, environment.brightest * intensity)
             }
         };
-        Ok(Self {
+        let uploaded = Self {
             features,
             constants,
             bindings: SceneBindings {
@@ -327,9 +307,10 @@ impl SceneOnGpu {
                 device_bytes: uploader.device_bytes,
                 geometry_bytes,
                 uploaded_bytes: uploader.uploaded_bytes,
-                triangles: shapes.shapes.triangles.len() as u64,
+                triangles: shapes.triangles.len() as u64,
                 lights: light_count,
             },
-        })
+        };
+        Ok((uploaded, edit))
     }
 }

@@ -4,14 +4,14 @@ use super::{RenderError, Renderer, inspect::first_hit_params};
 use crate::{
     kernels::{Kernel, KernelKey},
     scene::Scene,
-    upload::SketchOnGpu,
+    upload::{SceneCache, SketchOnGpu},
     view::ViewSettings,
 };
 
 impl Renderer {
     /// Draws what a view of a scene shows first, from the film's place, in the mean colours of its surfaces: a picture that needs
     /// neither textures nor lights nor the path kernel, which a driver may compile for seconds. The scene's geometry goes to the
-    /// device, where [`Renderer::set_scene`] finds it; film and present scene stay. Of `settings` only projection and size count.
+    /// device, where [`Renderer::set_scene`] finds it if no scene was set before; film and present scene stay. Of `settings` only projection and size count.
     ///
     /// # Errors
     /// When the geometry does not fit the device or the kernel does not compile.
@@ -22,7 +22,9 @@ impl Renderer {
         target: &wgpu::TextureView,
         format: wgpu::TextureFormat,
     ) -> Result<(), RenderError> {
-        let on_gpu = SketchOnGpu::upload(&self.gpu, scene, &mut self.cache)?;
+        let mut apart = SceneCache::new(self.cache.hierarchy());
+        let cache = if self.scene.is_none() { &mut self.cache } else { &mut apart };
+        let on_gpu = SketchOnGpu::upload(&self.gpu, scene, cache)?;
         let key = KernelKey {
             kernel: Kernel::Sketch,
             features: on_gpu.features,

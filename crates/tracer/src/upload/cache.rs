@@ -12,7 +12,7 @@ use super::{
     albedo::{self, TABLE_FEATURES},
     environment::EnvironmentOnGpu,
     geometry::{BlasCache, Shapes, Split},
-    tables::Tables,
+    tables::{Edit, Tables},
     texels::TexelHeap,
 };
 use crate::{
@@ -25,15 +25,6 @@ use crate::{
 const MOST_MOVED: usize = 16;
 /// Instances that are kept apart in all; beyond, traversal would suffer, and they join the static mesh again.
 const MOST_LOOSE: usize = 64;
-
-/// Shapes on the device.
-#[derive(Debug)]
-pub(super) struct ShapesOnGpu {
-    /// Without nodes and positions, which nothing on the host needs any more.
-    pub shapes: Shapes,
-    pub tables: Tables,
-    bytes: u64,
-}
 
 /// An instance as the last version of the scene had it.
 #[derive(Debug, PartialEq)]
@@ -48,7 +39,8 @@ struct Seen {
 pub struct SceneCache {
     hierarchy: HierarchyKind,
     blas: BlasCache,
-    shapes: Option<Arc<ShapesOnGpu>>,
+    /// Without nodes and positions, which nothing on the host needs any more; and where they are on the device.
+    shapes: Option<(Arc<Shapes>, Tables)>,
     texels: Option<(ContentHash, Arc<TexelHeap>)>,
     environment: Option<(Option<ContentHash>, Arc<EnvironmentOnGpu>)>,
     lobe_tables: Option<([bool; 3], wgpu::TextureView, u64)>,
@@ -62,6 +54,11 @@ impl SceneCache {
     /// Nothing yet; hierarchies will be of this kind.
     pub fn new(hierarchy: HierarchyKind) -> Self {
         Self { hierarchy, ..Self::default() }
+    }
+
+    /// Keeps the hierarchies alone: what is on the device is not, or will not become, what is known of it here.
+    pub(crate) fn forget_device(&mut self) {
+        *self = Self { hierarchy: self.hierarchy, blas: std::mem::take(&mut self.blas), ..Self::default() };
     }
 
     /// What its hierarchies are.
@@ -92,53 +89,44 @@ impl SceneCache {
         Split::of(scene, &self.loose)
     }
 
+    /// A scene's shapes, and what is to be written into their tables; whoever does not write it gives up the cache.
     pub(super) fn shapes(
         &mut self,
         scene: &Scene,
         split: &Split,
         uploader: &mut Uploader<'_>,
-    ) -> Result<Arc<ShapesOnGpu>, UploadError> {
+    ) -> Result<(Arc<Shapes>, Edit), UploadError> {
         // Not both on the device at once, where they are built anew.
-        let last = self.shapes.take().and_then(Arc::into_inner);
+        let last = self.shapes.take().and_then(|(shapes, tables)| Some((Arc::into_inner(shapes)?, tables)));
         let grown = match last {
             Some(last) => self.grown_shapes(last, scene, split, uploader)?,
             None => None,
         };
-        let shapes = match grown {
+        let (mut shapes, edit) = match grown {
             Some(grown) => grown,
             None => {
-                let mut shapes = Shapes::build(scene, split, self.hierarchy, &mut self.blas);
-                let before = uploader.device_bytes;
+                let shapes = Shapes::build(scene, split, self.hierarchy, &mut self.blas);
                 let tables = Tables::upload(&shapes, split.entries(), uploader)?;
-                (shapes.nodes, shapes.positions) = (Vec::new(), Vec::new());
-                ShapesOnGpu { shapes, tables, bytes: uploader.device_bytes - before }
+                (shapes, Edit::none(tables))
             }
         };
+        (shapes.nodes, shapes.positions) = (Vec::new(), Vec::new());
         let shapes = Arc::new(shapes);
-        self.shapes = Some(shapes.clone());
-        Ok(shapes)
+        self.shapes = Some((shapes.clone(), edit.tables().clone()));
+        Ok((shapes, edit))
     }
 
     /// Those of the last version, where this one's follow from them.
     fn grown_shapes(
         &mut self,
-        last: ShapesOnGpu,
+        (mut shapes, tables): (Shapes, Tables),
         scene: &Scene,
         split: &Split,
         uploader: &mut Uploader<'_>,
-    ) -> Result<Option<ShapesOnGpu>, UploadError> {
-        let ShapesOnGpu { mut shapes, tables, bytes } = last;
+    ) -> Result<Option<(Shapes, Edit)>, UploadError> {
         let Some(growth) = shapes.grow(scene, split, self.hierarchy, &mut self.blas) else { return Ok(None) };
-        if shapes.nodes.is_empty() && growth.gone.is_empty() {
-            uploader.count(bytes, false);
-            return Ok(Some(ShapesOnGpu { shapes, tables, bytes }));
-        }
-        let before = uploader.device_bytes;
-        let Some(tables) = tables.grown(&shapes, &growth, split.entries(), uploader)? else { return Ok(None) };
-        (shapes.nodes, shapes.positions) = (Vec::new(), Vec::new());
-        let bytes = tables.bytes();
-        uploader.count(bytes.saturating_sub(uploader.device_bytes - before), false);
-        Ok(Some(ShapesOnGpu { shapes, tables, bytes }))
+        let edit = tables.grown(&shapes, &growth, split.entries(), uploader)?;
+        Ok(edit.map(|edit| (shapes, edit)))
     }
 
     pub(super) fn texels(&mut self, scene: &Scene, uploader: &mut Uploader<'_>) -> Result<Arc<TexelHeap>, UploadError> {

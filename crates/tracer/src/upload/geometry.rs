@@ -59,6 +59,9 @@ pub(super) struct Part {
     hash: ContentHash,
     /// Its triangles are degenerate: the instance is placed by itself, or hidden.
     pub is_gone: bool,
+    /// Its part of the static mesh's vertices.
+    vertices: Range<u32>,
+    triangles: usize,
 }
 
 /// Shapes in the kernels' layout.
@@ -117,11 +120,15 @@ impl Split {
 
     /// The static mesh's parts, were it built of this.
     fn parts(&self, scene: &Scene) -> Vec<Part> {
+        let mut vertices = 0;
         let part = |&source: &u32| {
             let instance = &scene.instances[source as usize];
+            let mesh = &scene.meshes[instance.mesh as usize];
             let matrix = instance.world_from_mesh.to_cols_array();
-            let mesh = scene.meshes[instance.mesh as usize].hash.mix(bytemuck::cast_slice(&matrix));
-            Part { source, hash: mesh.mix(&[u8::from(passes_light(scene, instance))]), is_gone: false }
+            let hash = mesh.hash.mix(bytemuck::cast_slice(&matrix)).mix(&[u8::from(passes_light(scene, instance))]);
+            let first = vertices;
+            vertices += mesh.positions.len() as u32;
+            Part { source, hash, is_gone: false, vertices: first..vertices, triangles: mesh.triangles.len() }
         };
         self.fixed.iter().map(part).collect()
     }
@@ -177,19 +184,18 @@ impl Shapes {
         if left.peek().is_some() {
             return None;
         }
+        let gone = self.parts.iter().zip(&goes).filter(|(_, goes)| **goes);
         let all = self.static_mesh.as_ref().map_or(0..0, |piece| piece.triangles.clone());
-        let goes_with = |slot: u32| {
-            let [first, ..] = self.triangles[slot as usize];
-            goes[self.vertices[first as usize].part as usize]
-        };
-        let gone = if self.parts.iter().zip(&goes).any(|(part, goes)| *goes && !part.is_gone) {
-            runs(all.clone(), goes_with)
-        } else {
-            Vec::new()
-        };
-        if gone.iter().map(|run| run.len()).sum::<usize>() > all.len() / 2 {
+        if gone.clone().map(|(part, _)| part.triangles).sum::<usize>() > all.len() / 2 {
             return None;
         }
+        let leaving: Vec<Range<u32>> =
+            gone.filter(|(part, _)| !part.is_gone).map(|(part, _)| part.vertices.clone()).collect();
+        let leaves = |slot: u32| {
+            let [first, ..] = self.triangles[slot as usize];
+            leaving.iter().any(|vertices| vertices.contains(&first))
+        };
+        let gone = if leaving.is_empty() { Vec::new() } else { runs(all, leaves) };
         let growth =
             Growth { nodes: self.node_count, triangles: self.triangles.len(), vertices: self.vertices.len(), gone };
         for (part, goes) in self.parts.iter_mut().zip(goes) {

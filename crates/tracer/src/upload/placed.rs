@@ -2,7 +2,12 @@
 
 use std::sync::Arc;
 
-use super::{SceneCache, UploadError, Uploader, cache::ShapesOnGpu, placement::Placement, tables::Tables};
+use super::{
+    SceneCache, UploadError, Uploader,
+    geometry::Shapes,
+    placement::Placement,
+    tables::{Edit, Tables},
+};
 use crate::{
     bvh::HierarchyKind,
     features::{Feature, SceneFeatures},
@@ -12,31 +17,32 @@ use crate::{
 
 /// All that traversal needs but the instance table, which lights have a part in.
 pub(super) struct Placed {
-    pub shapes: Arc<ShapesOnGpu>,
+    pub shapes: Arc<Shapes>,
     pub placement: Placement,
-    /// The shapes', with the upper level.
-    pub tables: Tables,
+    /// Of the shapes and the upper level, to be written into their tables.
+    pub edit: Edit,
 }
 
 impl Placed {
-    /// Builds and uploads what is not in `cache`.
+    /// Builds what is not in `cache`, and uploads it but for the edit.
     pub(super) fn upload(
         scene: &Scene,
         cache: &mut SceneCache,
         uploader: &mut Uploader<'_>,
     ) -> Result<Self, UploadError> {
         let split = cache.split(scene);
-        let shapes = cache.shapes(scene, &split, uploader)?;
-        let placement = Placement::of(scene, &split, cache.hierarchy(), &shapes.shapes);
-        let tables = shapes.tables.with_upper_level(shapes.shapes.node_count, &placement.nodes, uploader)?;
-        Ok(Self { shapes, placement, tables })
+        let (shapes, mut edit) = cache.shapes(scene, &split, uploader)?;
+        let placement = Placement::of(scene, &split, cache.hierarchy(), &shapes);
+        edit.add_upper_level(shapes.node_count, &placement.nodes);
+        uploader.uploaded_bytes += edit.bytes();
+        Ok(Self { shapes, placement, edit })
     }
 
     /// What a kernel must contain for the geometry.
     pub(super) fn features(&self, hierarchy: HierarchyKind) -> SceneFeatures {
         SceneFeatures::default()
             .with(Feature::Instances, !self.placement.is_single_level)
-            .with(Feature::GeometryTextures, matches!(self.tables, Tables::Textures(_)))
+            .with(Feature::GeometryTextures, matches!(self.edit.tables(), Tables::Textures(_)))
             .with(Feature::BinaryNodes, hierarchy == HierarchyKind::Binary)
     }
 

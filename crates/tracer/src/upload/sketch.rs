@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Placed, SceneCache, UploadError, Uploader};
+use super::{Placed, SceneCache, UploadError, Uploader, tables::Tables};
 use crate::{
     features::SceneFeatures,
     gpu::{Complaints, Gpu},
@@ -24,12 +24,17 @@ pub(crate) struct SketchOnGpu {
     /// Linear RGB of each entry of the instance table.
     pub part_colors: wgpu::Buffer,
     instances: wgpu::Buffer,
-    placed: Placed,
+    tables: Tables,
 }
 
 impl SketchOnGpu {
-    /// Builds and uploads what is not in `cache`; an upload of the same scene finds it there.
+    /// Builds and uploads what is not in `cache`; an upload of the same scene finds it there. Scenes that share the cache's tables
+    /// are no longer to be traced.
     pub fn upload(gpu: &Gpu, scene: &Scene, cache: &mut SceneCache) -> Result<Self, UploadError> {
+        Self::try_upload(gpu, scene, cache).inspect_err(|_| cache.forget_device())
+    }
+
+    fn try_upload(gpu: &Gpu, scene: &Scene, cache: &mut SceneCache) -> Result<Self, UploadError> {
         let complaints = Complaints::of(&gpu.device);
         let mut uploader = Uploader { gpu, device_bytes: 0, uploaded_bytes: 0 };
         let placed = Placed::upload(scene, cache, &mut uploader)?;
@@ -42,14 +47,16 @@ impl SketchOnGpu {
         let part_colors: Vec<[f32; 4]> = placed.placement.sources.iter().map(color_of).collect();
         let part_colors = uploader.storage("part colours", &part_colors)?;
         let instances = uploader.storage("instances", &placed.placement.instances)?;
-        uploader.settle(complaints, cache)?;
+        uploader.settle(complaints)?;
         let (features, constants) = (placed.features(cache.hierarchy()), placed.constants([0; 2]));
-        Ok(Self { features, constants, part_colors, instances, placed })
+        let tables = placed.edit.tables().clone();
+        placed.edit.write(gpu);
+        Ok(Self { features, constants, part_colors, instances, tables })
     }
 
     /// Of group 1 of the path kernels, what is there.
     pub fn resources(&self) -> Vec<(u32, wgpu::BindingResource<'_>)> {
-        let mut resources = self.placed.tables.resources();
+        let mut resources = self.tables.resources();
         resources.push((4, self.instances.as_entire_binding()));
         resources
     }

@@ -1,12 +1,15 @@
 //! The geometry's tables on the device: in storage buffers, or in texture pages, which a binding's size does not bound.
 //! Twin: `shaders/scene/tables.wesl`.
+//!
+//! Tables have room for an upper level and for objects that leave the static mesh, so that an edit writes its rows in place. It
+//! does so when the new version of the scene is sure to be used ([`Edit::write`]); until then the last one can be gone back to.
 
 use super::{
     UploadError, Uploader,
     geometry::{Growth, Shapes},
     pages::Pages,
 };
-use crate::{bvh::Node, kernels::layout::Vertex};
+use crate::{bvh::Node, gpu::Gpu, kernels::layout::Vertex};
 
 /// Nodes, positions, triangles, vertices.
 #[derive(Clone, Debug)]
@@ -17,10 +20,37 @@ pub(super) enum Tables {
     Textures(Box<[Pages; 4]>),
 }
 
+/// What is to be written into tables for another version of a scene.
+#[derive(Debug)]
+#[must_use = "the tables lack it until it is written"]
+pub struct Edit {
+    tables: Tables,
+    rows: Vec<Rows>,
+}
+
+/// Successive rows of one table.
+#[derive(Debug)]
+struct Rows {
+    table: usize,
+    first: usize,
+    /// As the table has them.
+    bytes: Vec<u8>,
+}
+
 const LABELS: [&str; 4] = ["hierarchy nodes", "triangle positions", "triangles", "vertices"];
-const NODE_TEXELS: usize = 5;
-const CORNERS: usize = 3;
-const VERTEX_TEXELS: usize = 3;
+const NODES: usize = 0;
+const POSITIONS: usize = 1;
+const TRIANGLES: usize = 2;
+const VERTICES: usize = 3;
+/// Bytes of a row in a buffer.
+const ROW_BYTES: [usize; 4] = [size_of::<Node>(), size_of::<[f32; 9]>(), size_of::<[u32; 4]>(), size_of::<Vertex>()];
+/// Texels of a row in pages.
+const ROW_TEXELS: [usize; 4] = [5, 3, 1, 3];
+
+/// A table has room for one part in so many of what it holds,
+const ROOM_PART: usize = 8;
+/// but for so many bytes at most.
+const ROOM_BYTES: usize = 8 << 20;
 
 type Texel = [u32; 4];
 
@@ -31,29 +61,31 @@ impl Tables {
         upper_nodes: usize,
         uploader: &mut Uploader<'_>,
     ) -> Result<Self, UploadError> {
-        let largest = sizes(shapes, upper_nodes);
-        if uploader.gpu.keeps_in_buffers(largest) {
-            uploader.check_memory("geometry", largest.iter().sum())?;
-            return Ok(Self::Buffers([
-                uploader.storage(LABELS[0], &shapes.nodes)?,
-                uploader.storage(LABELS[1], &shapes.positions)?,
-                uploader.storage(LABELS[2], &shapes.triangles)?,
-                uploader.storage(LABELS[3], &shapes.vertices)?,
-            ]));
-        }
-        let texels = (shapes.node_count as usize + upper_nodes) * NODE_TEXELS
-            + shapes.triangles.len() * (CORNERS + 1)
-            + shapes.vertices.len() * VERTEX_TEXELS;
-        uploader.check_memory("geometry", (texels * size_of::<Texel>()) as u64)?;
-        let nodes = shapes.nodes.iter().flat_map(node_texels);
-        let positions = shapes.positions.iter().flat_map(corner_texels);
-        let vertices = shapes.vertices.iter().flat_map(vertex_texels);
-        Ok(Self::Textures(Box::new([
-            uploader.pages(LABELS[0], shapes.nodes.len() * NODE_TEXELS, nodes)?,
-            uploader.pages(LABELS[1], shapes.positions.len() * CORNERS, positions)?,
-            uploader.pages(LABELS[2], shapes.triangles.len(), shapes.triangles.iter().copied())?,
-            uploader.pages(LABELS[3], shapes.vertices.len() * VERTEX_TEXELS, vertices)?,
-        ])))
+        let rows = rows_needed(shapes, upper_nodes);
+        let in_buffers = is_in_buffers(rows, uploader);
+        let bytes =
+            |table: usize| if in_buffers { buffer_bytes(table, rows[table]) } else { page_bytes(table, rows[table]) };
+        uploader.check_memory("geometry", (0..4).map(bytes).sum())?;
+        let tables = if in_buffers {
+            Self::Buffers([
+                uploader.table_buffer(NODES, rows[NODES], bytemuck::cast_slice(&shapes.nodes))?,
+                uploader.table_buffer(POSITIONS, rows[POSITIONS], bytemuck::cast_slice(&shapes.positions))?,
+                uploader.table_buffer(TRIANGLES, rows[TRIANGLES], bytemuck::cast_slice(&shapes.triangles))?,
+                uploader.table_buffer(VERTICES, rows[VERTICES], bytemuck::cast_slice(&shapes.vertices))?,
+            ])
+        } else {
+            let nodes = uploader.table_pages(NODES, rows[NODES])?;
+            nodes.fill(uploader.gpu, shapes.nodes.iter().flat_map(node_texels));
+            let positions = uploader.table_pages(POSITIONS, rows[POSITIONS])?;
+            positions.fill(uploader.gpu, shapes.positions.iter().flat_map(corner_texels));
+            let triangles = uploader.table_pages(TRIANGLES, rows[TRIANGLES])?;
+            triangles.fill(uploader.gpu, shapes.triangles.iter().copied());
+            let vertices = uploader.table_pages(VERTICES, rows[VERTICES])?;
+            vertices.fill(uploader.gpu, shapes.vertices.iter().flat_map(vertex_texels));
+            Self::Textures(Box::new([nodes, positions, triangles, vertices]))
+        };
+        uploader.count(tables.bytes(), true);
+        Ok(tables)
     }
 
     /// As group 1 of the path kernels binds them.
@@ -75,158 +107,177 @@ impl Tables {
         }
     }
 
-    /// These tables with what shapes have grown by since; `None` where they would no longer be what these are.
+    /// These tables, or larger ones with what these hold, and what is to be written into them for what shapes have grown by since.
+    /// `None` where they would no longer be what these are.
     pub(super) fn grown(
         &self,
         shapes: &Shapes,
         growth: &Growth,
         upper_nodes: usize,
         uploader: &mut Uploader<'_>,
-    ) -> Result<Option<Self>, UploadError> {
-        let tails = (
-            &shapes.nodes,
-            &shapes.positions,
-            &shapes.triangles[growth.triangles..],
-            &shapes.vertices[growth.vertices..],
-        );
-        match self {
-            Self::Buffers(buffers) => {
-                if !uploader.gpu.keeps_in_buffers(sizes(shapes, upper_nodes)) {
-                    return Ok(None);
-                }
-                let [nodes, positions, triangles, vertices] = buffers;
-                let at = growth.nodes as usize;
-                let nodes = uploader.longer(LABELS[0], (nodes, at), tails.0)?;
-                let positions = uploader.longer(LABELS[1], (positions, growth.triangles), tails.1)?;
-                let triangles = uploader.longer(LABELS[2], (triangles, growth.triangles), tails.2)?;
-                let vertices = uploader.longer(LABELS[3], (vertices, growth.vertices), tails.3)?;
-                let mut encoder = uploader.gpu.device.create_command_encoder(&Default::default());
-                for run in &growth.gone {
-                    let [at, bytes] =
-                        [run.start, run.len() as u32].map(|n| u64::from(n) * size_of::<[f32; 9]>() as u64);
-                    encoder.clear_buffer(&positions, at, Some(bytes));
-                }
-                uploader.gpu.queue.submit([encoder.finish()]);
-                Ok(Some(Self::Buffers([nodes, positions, triangles, vertices])))
-            }
-            Self::Textures(tables) => {
-                let heads = [
-                    growth.nodes as usize * NODE_TEXELS,
-                    growth.triangles * CORNERS,
-                    growth.triangles,
-                    growth.vertices * VERTEX_TEXELS,
-                ];
-                let texels: [Vec<Texel>; 4] = [
-                    tails.0.iter().flat_map(node_texels).collect(),
-                    tails.1.iter().flat_map(corner_texels).collect(),
-                    tails.2.to_vec(),
-                    tails.3.iter().flat_map(vertex_texels).collect(),
-                ];
-                let mut longer = |i: usize| uploader.longer_pages(LABELS[i], (&tables[i], heads[i]), &texels[i]);
-                let [nodes, positions, triangles, vertices] = [longer(0)?, longer(1)?, longer(2)?, longer(3)?];
-                for run in &growth.gone {
-                    let corners = vec![[0; 4]; run.len() * CORNERS];
-                    positions.put::<Texel>(uploader.gpu, run.start as usize * CORNERS, &corners);
-                }
-                Ok(Some(Self::Textures(Box::new([nodes, positions, triangles, vertices]))))
-            }
+    ) -> Result<Option<Edit>, UploadError> {
+        let rows = rows_needed(shapes, upper_nodes);
+        let tables = match self {
+            Self::Buffers(_) if !is_in_buffers(rows, uploader) => return Ok(None),
+            Self::Buffers([nodes, positions, triangles, vertices]) => Self::Buffers([
+                uploader.buffer_with_room(NODES, rows[NODES], nodes)?,
+                uploader.buffer_with_room(POSITIONS, rows[POSITIONS], positions)?,
+                uploader.buffer_with_room(TRIANGLES, rows[TRIANGLES], triangles)?,
+                uploader.buffer_with_room(VERTICES, rows[VERTICES], vertices)?,
+            ]),
+            Self::Textures(tables) => Self::Textures(Box::new([
+                uploader.pages_with_room(NODES, rows[NODES], &tables[NODES])?,
+                uploader.pages_with_room(POSITIONS, rows[POSITIONS], &tables[POSITIONS])?,
+                uploader.pages_with_room(TRIANGLES, rows[TRIANGLES], &tables[TRIANGLES])?,
+                uploader.pages_with_room(VERTICES, rows[VERTICES], &tables[VERTICES])?,
+            ])),
+        };
+        uploader.count(tables.bytes(), false);
+        let mut edit = Edit::none(tables);
+        edit.push(NODES, growth.nodes as usize, &shapes.nodes, node_texels);
+        edit.push(POSITIONS, growth.triangles, &shapes.positions, corner_texels);
+        edit.push(TRIANGLES, growth.triangles, &shapes.triangles[growth.triangles..], |&texel| [texel]);
+        edit.push(VERTICES, growth.vertices, &shapes.vertices[growth.vertices..], vertex_texels);
+        for run in &growth.gone {
+            edit.push(POSITIONS, run.start as usize, &vec![[0.0; 9]; run.len()], corner_texels);
         }
-    }
-
-    /// These tables with an upper level, if there is one, behind `shape_nodes` nodes, and its root in the place of the first node.
-    pub(super) fn with_upper_level(
-        &self,
-        shape_nodes: u32,
-        upper: &[Node],
-        uploader: &mut Uploader<'_>,
-    ) -> Result<Self, UploadError> {
-        let Some(root) = upper.first() else { return Ok(self.clone()) };
-        let shape_nodes = shape_nodes as usize;
-        match self {
-            Self::Buffers([nodes, others @ ..]) => {
-                let nodes = uploader.longer(LABELS[0], (nodes, shape_nodes), upper)?;
-                uploader.gpu.queue.write_buffer(&nodes, 0, bytemuck::bytes_of(root));
-                let [positions, triangles, vertices] = others.clone();
-                Ok(Self::Buffers([nodes, positions, triangles, vertices]))
-            }
-            Self::Textures(tables) => {
-                let texels: Vec<Texel> = upper.iter().flat_map(node_texels).collect();
-                let nodes = uploader.longer_pages(LABELS[0], (&tables[0], shape_nodes * NODE_TEXELS), &texels)?;
-                nodes.put(uploader.gpu, 0, &node_texels(root));
-                let mut tables = tables.clone();
-                tables[0] = nodes;
-                Ok(Self::Textures(tables))
-            }
-        }
+        Ok(Some(edit))
     }
 }
 
-/// Bytes of each table, with room for an upper level of so many nodes.
-fn sizes(shapes: &Shapes, upper_nodes: usize) -> [u64; 4] {
-    [
-        (shapes.node_count as usize + upper_nodes) * size_of::<Node>(),
-        shapes.triangles.len() * size_of::<[f32; 9]>(),
-        size_of_val(&shapes.triangles[..]),
-        size_of_val(&shapes.vertices[..]),
-    ]
-    .map(|bytes| bytes as u64)
+impl Edit {
+    /// Nothing that is to be written into these.
+    pub(super) fn none(tables: Tables) -> Self {
+        Self { tables, rows: Vec::new() }
+    }
+
+    /// The tables as they will be.
+    pub(super) fn tables(&self) -> &Tables {
+        &self.tables
+    }
+
+    /// Adds an upper level, if there is one, behind `shape_nodes` nodes, and its root in the place of the first node.
+    pub(super) fn add_upper_level(&mut self, shape_nodes: u32, upper: &[Node]) {
+        self.push(NODES, shape_nodes as usize, upper, node_texels);
+        self.push(NODES, 0, &upper[..upper.len().min(1)], node_texels);
+    }
+
+    /// Bytes to be written.
+    pub(super) fn bytes(&self) -> u64 {
+        self.rows.iter().map(|rows| rows.bytes.len() as u64).sum()
+    }
+
+    /// Writes it, before what is submitted from now on.
+    pub fn write(self, gpu: &Gpu) {
+        for Rows { table, first, bytes } in &self.rows {
+            match &self.tables {
+                Tables::Buffers(buffers) => {
+                    gpu.queue.write_buffer(&buffers[*table], (first * ROW_BYTES[*table]) as u64, bytes);
+                }
+                Tables::Textures(tables) => {
+                    tables[*table].put::<Texel>(gpu, first * ROW_TEXELS[*table], bytemuck::cast_slice(bytes));
+                }
+            }
+        }
+    }
+
+    fn push<T: bytemuck::NoUninit, const N: usize>(
+        &mut self,
+        table: usize,
+        first: usize,
+        rows: &[T],
+        texels: impl Fn(&T) -> [Texel; N],
+    ) {
+        if rows.is_empty() {
+            return;
+        }
+        let bytes = match &self.tables {
+            Tables::Buffers(_) => bytemuck::cast_slice(rows).to_vec(),
+            Tables::Textures(_) => {
+                let texels: Vec<Texel> = rows.iter().flat_map(texels).collect();
+                bytemuck::cast_slice(&texels).to_vec()
+            }
+        };
+        self.rows.push(Rows { table, first, bytes });
+    }
 }
 
 impl Uploader<'_> {
-    /// The first `rows` of a buffer, and more.
-    fn longer<T: bytemuck::NoUninit>(
-        &mut self,
-        what: &'static str,
-        (start, rows): (&wgpu::Buffer, usize),
-        more: &[T],
-    ) -> Result<wgpu::Buffer, UploadError> {
-        let head = (rows * size_of::<T>()) as u64;
-        self.appended(what, (start, head), (head, more))
+    /// With room for `rows` and more.
+    fn table_buffer(&self, table: usize, rows: usize, contents: &[u8]) -> Result<wgpu::Buffer, UploadError> {
+        self.check(LABELS[table], (rows * ROW_BYTES[table]) as u64)?;
+        let size = buffer_bytes(table, rows).min(self.gpu.largest_binding());
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
+        Ok(self.gpu.buffer_with_room(LABELS[table], contents, size, usage))
     }
 
-    /// The first `head` texels of a stack of pages, and more.
-    fn longer_pages(
-        &mut self,
-        what: &'static str,
-        (start, head): (&Pages, usize),
-        more: &[Texel],
-    ) -> Result<Pages, UploadError> {
-        let pages = self.empty_pages(what, head + more.len(), more.len())?;
-        pages.copy_from(self.gpu, start);
-        pages.put(self.gpu, head, more);
-        Ok(pages)
+    /// With room for `rows` and more.
+    fn table_pages(&self, table: usize, rows: usize) -> Result<Pages, UploadError> {
+        let (format, binding) = (wgpu::TextureFormat::Rgba32Uint, wgpu::TextureUsages::STORAGE_BINDING);
+        let texels = page_bytes(table, rows) / size_of::<Texel>() as u64;
+        Pages::new(self.gpu, LABELS[table], format, binding, texels)
     }
 
-    fn empty_pages(&mut self, what: &'static str, texels: usize, new_texels: usize) -> Result<Pages, UploadError> {
-        let binding = wgpu::TextureUsages::STORAGE_BINDING;
-        let pages = Pages::new(self.gpu, what, wgpu::TextureFormat::Rgba32Uint, binding, texels as u64)?;
-        self.device_bytes += pages.bytes();
-        self.uploaded_bytes += (new_texels * size_of::<Texel>()) as u64;
-        Ok(pages)
+    /// The same one, or where it is too small for so many rows a larger one that begins with what it holds.
+    fn buffer_with_room(&self, table: usize, rows: usize, now: &wgpu::Buffer) -> Result<wgpu::Buffer, UploadError> {
+        if (rows * ROW_BYTES[table]) as u64 <= now.size() {
+            return Ok(now.clone());
+        }
+        self.check_memory(LABELS[table], buffer_bytes(table, rows))?;
+        let larger = self.table_buffer(table, rows, &[])?;
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(now, 0, &larger, 0, now.size());
+        self.gpu.queue.submit([encoder.finish()]);
+        Ok(larger)
     }
 
-    fn pages(
-        &mut self,
-        what: &'static str,
-        count: usize,
-        texels: impl Iterator<Item = Texel>,
-    ) -> Result<Pages, UploadError> {
-        let pages = self.empty_pages(what, count, count)?;
-        pages.fill(self.gpu, texels);
-        Ok(pages)
+    /// The same ones, or where they are too few for so many rows more that begin with what they hold.
+    fn pages_with_room(&self, table: usize, rows: usize, now: &Pages) -> Result<Pages, UploadError> {
+        if (rows * ROW_TEXELS[table] * size_of::<Texel>()) as u64 <= now.bytes() {
+            return Ok(now.clone());
+        }
+        self.check_memory(LABELS[table], page_bytes(table, rows))?;
+        let larger = self.table_pages(table, rows)?;
+        larger.copy_from(self.gpu, now);
+        Ok(larger)
     }
 }
 
-fn node_texels(node: &Node) -> [Texel; NODE_TEXELS] {
+/// Of a table in a buffer, with room.
+fn buffer_bytes(table: usize, rows: usize) -> u64 {
+    with_room(rows * ROW_BYTES[table]).next_multiple_of(16).max(16)
+}
+
+/// Of a table in pages, with room.
+fn page_bytes(table: usize, rows: usize) -> u64 {
+    with_room(rows * ROW_TEXELS[table] * size_of::<Texel>())
+}
+
+fn with_room(bytes: usize) -> u64 {
+    (bytes + (bytes / ROOM_PART).min(ROOM_BYTES)) as u64
+}
+
+/// Rows of each table, with an upper level of so many nodes.
+fn rows_needed(shapes: &Shapes, upper_nodes: usize) -> [usize; 4] {
+    let triangles = shapes.triangles.len();
+    [shapes.node_count as usize + upper_nodes, triangles, triangles, shapes.vertices.len()]
+}
+
+/// Whether tables of so many rows are to be in buffers.
+fn is_in_buffers(rows: [usize; 4], uploader: &Uploader<'_>) -> bool {
+    uploader.gpu.keeps_in_buffers([0, 1, 2, 3].map(|table| (rows[table] * ROW_BYTES[table]) as u64))
+}
+
+fn node_texels(node: &Node) -> [Texel; ROW_TEXELS[NODES]] {
     bytemuck::cast(*node)
 }
 
-fn corner_texels(corners: &[f32; 9]) -> [Texel; CORNERS] {
+fn corner_texels(corners: &[f32; 9]) -> [Texel; ROW_TEXELS[POSITIONS]] {
     let w: [u32; 9] = corners.map(f32::to_bits);
     [[w[0], w[1], w[2], 0], [w[3], w[4], w[5], 0], [w[6], w[7], w[8], 0]]
 }
 
-fn vertex_texels(vertex: &Vertex) -> [Texel; VERTEX_TEXELS] {
+fn vertex_texels(vertex: &Vertex) -> [Texel; ROW_TEXELS[VERTICES]] {
     let w: [u32; 9] = bytemuck::cast(*vertex);
     [[w[0], w[1], w[2], w[3]], [w[4], w[5], w[6], w[7]], [w[8], 0, 0, 0]]
 }
