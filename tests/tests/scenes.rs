@@ -349,17 +349,20 @@ fn textures_do_not_alias_and_are_not_blurred() {
 }
 
 /// A clear sheet of half grey between lamps and floor halves their light, by every way of sampling; a sun shines through it.
+/// A texture makes it as smooth as the factor does.
 #[test]
 fn light_through_a_clear_sheet() {
     let gpu = device::gpu();
     let ray = [Vec3::new(6.0, 0.5, 0.0), Vec3::ZERO];
-    let with_sheet = |add_light: &dyn Fn(&mut Builder)| {
+    let with_sheet = |is_smooth_by_texture: bool, add_light: &dyn Fn(&mut Builder)| {
         let mut builder = Builder::new(Vec3::ZERO);
         floor(&mut builder, 0.7);
+        let smooth = is_smooth_by_texture.then(|| builder.texture(1, TexelEncoding::Linear, vec![[255, 0, 0, 255]]));
         let sheet = builder.material(Material {
             base_color: Vec3::splat(0.5).extend(1.0),
             metallic: 0.0,
-            roughness: 0.0,
+            roughness: if is_smooth_by_texture { 1.0 } else { 0.0 },
+            metallic_roughness_texture: smooth,
             ior: 1.0,
             specular: 0.0,
             transmission: 1.0,
@@ -376,10 +379,6 @@ fn light_through_a_clear_sheet() {
     };
     let factor: f64 =
         [(0.5, 1.0), (1.5, 1.0), (0.5, 2.0), (1.5, 2.0)].iter().map(|&(a, b)| corner_form_factor(a, b, 1.5)).sum();
-    for technique in [SamplingTechnique::Both, SamplingTechnique::Lights, SamplingTechnique::Bsdf] {
-        let value = measure_by(&gpu, &with_sheet(&lamp), ray, 1, (technique, 2 * SAMPLES));
-        assert_is(&format!("a lamp behind a sheet, {technique:?}"), value, 0.5 * 0.7 * 3.0 * factor);
-    }
     let sun = |builder: &mut Builder| {
         builder.light(PunctualLight {
             name: String::new(),
@@ -389,7 +388,16 @@ fn light_through_a_clear_sheet() {
             rotation: Quat::from_rotation_arc(Vec3::NEG_Z, Vec3::new(-0.6, -0.8, 0.0)),
         });
     };
-    assert_is("a sun behind a sheet", measure(&gpu, &with_sheet(&sun), ray, 1), 0.5 * 0.7 / PI * 5.0 * 0.8);
+    for is_smooth_by_texture in [false, true] {
+        let sheet = if is_smooth_by_texture { "a sheet smooth by texture" } else { "a sheet" };
+        let lit = with_sheet(is_smooth_by_texture, &lamp);
+        for technique in [SamplingTechnique::Both, SamplingTechnique::Lights, SamplingTechnique::Bsdf] {
+            let value = measure_by(&gpu, &lit, ray, 1, (technique, 2 * SAMPLES));
+            assert_is(&format!("a lamp behind {sheet}, {technique:?}"), value, 0.5 * 0.7 * 3.0 * factor);
+        }
+        let lit = with_sheet(is_smooth_by_texture, &sun);
+        assert_is(&format!("a sun behind {sheet}"), measure(&gpu, &lit, ray, 1), 0.5 * 0.7 / PI * 5.0 * 0.8);
+    }
 }
 
 /// A backdrop is what camera rays see that leave the scene, through cut-outs and clear sheets too; what is lit is so to the

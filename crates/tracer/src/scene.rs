@@ -369,10 +369,12 @@ impl Material {
         self.thickness > 0.0 && (self.transmission > 0.0 || self.diffuse_transmission > 0.0)
     }
 
-    /// True for a smooth transmissive surface without thickness: shadow rays pass it in straight lines, and lose what it stops.
+    /// True for a transmissive surface without thickness that is smooth, or may be by its texture: shadow rays pass it in straight
+    /// lines where it is, and lose what it stops.
     pub fn is_clear_sheet(&self) -> bool {
-        // The square of the roughness counts as 0 below 1e-3 in the shaders.
-        self.transmission > 0.0 && !self.is_solid() && self.roughness * self.roughness < 1e-3
+        // The square of the roughness counts as 0 below 1e-3 in the shaders, which ask at each hit.
+        let may_be_smooth = self.metallic_roughness_texture.is_some() || self.roughness * self.roughness < 1e-3;
+        self.transmission > 0.0 && !self.is_solid() && may_be_smooth
     }
 
     /// True when it is a light; what is unlit shows its base colour alone.
