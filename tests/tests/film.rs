@@ -166,6 +166,28 @@ fn power_of_two(n: u32) -> f32 {
     assert_eq!((statistics.non_finite, statistics.clamped), (0, 0));
 }
 
+/// An error of the library, and the film that was there stays.
+#[test]
+fn a_film_that_is_no_picture_is_refused() {
+    let gpu = device::gpu();
+    let small = FilmOptions::equirect(8, 4);
+    let mut renderer = renderer(&gpu, small, SequenceKind::Sobol);
+    for (film, said) in [
+        (FilmOptions::equirect(0, 8), "0x8 pixels"),
+        (FilmOptions::equirect(8, 0), "8x0 pixels"),
+        (FilmOptions::perspective(8, 0, 1.0), "8x0 pixels"),
+        (FilmOptions::perspective(8, 8, 4.0), "half extents [-2.18"),
+        (FilmOptions::perspective(8, 8, 0.0), "half extents [0.0, 0.0]"),
+    ] {
+        let options = RendererOptions { film, ..*renderer.options() };
+        let distribution = renderer.distribution().clone();
+        let made = Renderer::new(&gpu, &options, distribution).map(|_| ()).unwrap_err().to_string();
+        let set = renderer.set_film(film).unwrap_err().to_string();
+        assert!(made == set && made.contains(said), "{film:?}: {made}; {set}");
+    }
+    assert_eq!(renderer.options().film, small);
+}
+
 #[test]
 fn what_is_not_finite_is_dropped_and_counted_and_what_is_too_bright_is_clamped() {
     let gpu = device::gpu();

@@ -42,16 +42,22 @@ pub struct FilmOptions {
 }
 
 impl FilmOptions {
-    /// A panorama of this size; twice as wide as high is usual.
+    /// A panorama of this size in pixels, each side at least 1; twice as wide as high is usual.
     pub const fn equirect(width: u32, height: u32) -> Self {
         Self { mapping: FilmMapping::Equirect, width, height }
     }
 
-    /// A perspective film with this vertical angle of view in radians.
+    /// A perspective film of this size in pixels, each side at least 1, with this vertical angle of view in radians, above 0 and below
+    /// pi. [`Renderer`](crate::renderer::Renderer) refuses what is not a picture.
     pub fn perspective(width: u32, height: u32, yfov: f32) -> Self {
         let y = (yfov * 0.5).tan();
         let half_extent = [y * width as f32 / height as f32, y];
         Self { mapping: FilmMapping::Perspective { half_extent }, width, height }
+    }
+
+    /// Whether there is a pixel, and a place in the image plane for it.
+    pub(crate) fn is_picture(&self) -> bool {
+        self.pixels() > 0 && self.half_extent().iter().all(|&extent| extent > 0.0 && extent.is_finite())
     }
 
     /// Number of pixels.

@@ -78,6 +78,16 @@ pub enum RenderError {
         /// Bytes of memory that are free, where that is known.
         free: Option<u64>,
     },
+    /// A film without pixels, or whose image plane has no extent: an angle of view that is not between 0 and pi.
+    #[error("a film of {width}x{height} pixels and half extents {half_extent:?} is no picture")]
+    NoPicture {
+        /// Pixels.
+        width: u32,
+        /// Pixels.
+        height: u32,
+        /// Of the image plane at distance 1; 1 for a panorama.
+        half_extent: [f32; 2],
+    },
     /// A view has more pixels than the device can bind at once.
     #[error("a view of {width}x{height} pixels binds {bytes} bytes, and adapter {adapter} at most {limit}")]
     ViewTooLarge {
@@ -145,7 +155,7 @@ impl Renderer {
     /// Allocates the film and what does not depend on a scene.
     ///
     /// # Errors
-    /// When the film does not fit the device.
+    /// When the film is no picture or does not fit the device.
     pub fn new(gpu: &Gpu, options: &RendererOptions, distribution: Distribution) -> Result<Self, RenderError> {
         let (film, params) = allocate_film(gpu, options.film)?;
         let buffer = |label, size: u64, usage| {
@@ -237,7 +247,7 @@ impl Renderer {
     /// picture. A distribution over a list of film pixels is to be set anew, since their numbers differ.
     ///
     /// # Errors
-    /// When the film does not fit the device or a kernel for it does not compile; the last film then stays.
+    /// When the film is no picture, does not fit the device, or a kernel for it does not compile; the last film then stays.
     pub fn set_film(&mut self, options: FilmOptions) -> Result<(), RenderError> {
         if options == self.options.film {
             return Ok(());
@@ -555,6 +565,10 @@ fn allocate_film(gpu: &Gpu, options: FilmOptions) -> Result<(Film, Vec<wgpu::Buf
         adapter: gpu.info().name.clone(),
         free: gpu.free_memory(),
     };
+    if !options.is_picture() {
+        let FilmOptions { width, height, .. } = options;
+        return Err(RenderError::NoPicture { width, height, half_extent: options.half_extent() });
+    }
     if options.pixels() > u64::from(u32::MAX) || u64::from(options.width) * 40 > gpu.largest_binding() {
         return Err(too_large());
     }
