@@ -15,7 +15,7 @@ use fovea_tests::{
 };
 use glam::{Affine3A, DAffine3, DVec3, Quat, Vec3};
 use tracer::{
-    bvh::HierarchyKind,
+    bvh::{Blas, HierarchyKind, Tlas, TlasEntry},
     distribution::Distribution,
     film::FilmOptions,
     kernels::FILM_WORDS,
@@ -289,6 +289,24 @@ fn alpha_tests_leave_opaque_triangles_alone() {
 }
 
 /// Few copies join the static mesh, many keep a hierarchy of their own: both, with mirrors and unequal scales.
+/// Things can be moved anywhere; the area of a box that overflows would end in a panic of the builder.
+#[test]
+fn hierarchies_beyond_all_measure() {
+    for kind in [HierarchyKind::Wide, HierarchyKind::Binary] {
+        let mut corners = soup(60, 0.5, 9);
+        corners[7][1] = Vec3::splat(f32::MAX);
+        corners[31][2] = Vec3::new(-2e38, 0.0, 2e38);
+        let triangles: Vec<[u32; 3]> = (0..60).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        let blas = Arc::new(Blas::build(kind, corners.as_flattened(), &triangles));
+        assert_eq!(blas.triangle_order.len(), 60);
+        let placed = |i: u32| Affine3A::from_scale(Vec3::splat(10f32.powi(i as i32)));
+        let entries: Vec<_> = (0..38)
+            .map(|i| TlasEntry { world_from_mesh: placed(i), blas: Arc::clone(&blas), source: Some(i) })
+            .collect();
+        assert_eq!(Tlas::build(kind, &entries).order.len(), 38);
+    }
+}
+
 #[test]
 fn instances() {
     for (triangles, copies) in [(300, 6), (4200, 8)] {

@@ -6,7 +6,7 @@
 use glam::{EulerRot, Quat, Vec2, Vec3};
 
 /// Smallest and largest angle, in degrees, that a view may span along one axis.
-pub const FOV_RANGE_DEG: std::ops::RangeInclusive<f32> = 0.1..=170.0;
+pub const FOV_RANGE_DEG: std::ops::RangeInclusive<f32> = 0.1..=tracer::scene::LARGEST_YFOV_DEG;
 
 /// Unit direction in film space of yaw (+ to the right) and pitch (+ up), radians from the film's centre.
 pub fn direction(yaw: f32, pitch: f32) -> Vec3 {

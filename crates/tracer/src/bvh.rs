@@ -15,6 +15,10 @@ use crate::gpu::Gpu;
 
 mod binary;
 
+/// Metres. Boxes end here: from areas of larger ones, which overflow in f32, no hierarchy can be built. What reaches beyond is hit
+/// only within, if at all.
+pub const LARGEST_COORDINATE: f32 = 1e15;
+
 /// A node as the kernels read it, of either kind of hierarchy: a CWBVH's, or a pair of children.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
@@ -103,7 +107,7 @@ impl Blas {
         let triangles: Vec<Triangle> = triangles
             .iter()
             .map(|corners| {
-                let [v0, v1, v2] = corners.map(|i| Vec3A::from(positions[i as usize]));
+                let [v0, v1, v2] = corners.map(|i| within_limit(Vec3A::from(positions[i as usize])));
                 Triangle { v0, v1, v2 }
             })
             .collect();
@@ -133,7 +137,11 @@ pub fn transformed_bounds(bounds: &Aabb, world_from_mesh: &Affine3A) -> Aabb {
     let new_half = m.x_axis.abs() * half.x + m.y_axis.abs() * half.y + m.z_axis.abs() * half.z;
     let new_centre = world_from_mesh.transform_point3a(centre);
     let slack = (new_centre.abs() + new_half + world_from_mesh.translation.abs()) * 1e-6;
-    Aabb::new(new_centre - new_half - slack, new_centre + new_half + slack)
+    Aabb::new(within_limit(new_centre - new_half - slack), within_limit(new_centre + new_half + slack))
+}
+
+fn within_limit(point: Vec3A) -> Vec3A {
+    point.clamp(Vec3A::splat(-LARGEST_COORDINATE), Vec3A::splat(LARGEST_COORDINATE))
 }
 
 /// Good traversal for a moderate build time; no spatial splits, because lights refer to triangles by leaf order.

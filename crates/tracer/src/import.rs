@@ -13,6 +13,11 @@
 //! - Missing normals become flat ones; missing tangents are made by MikkTSpace where a material needs them.
 //! - A missing or undecodable image becomes one neutral texel (black for emission, flat for normals, else white).
 //! - Lights fall off by the inverse square alone: their `range`, a hint for rasterisers, is not used.
+//! - Solids are as thick as their mesh: of `thicknessTexture` nothing is used. Neither is `occlusionTexture`, which nearly every file has:
+//!   paths find the shade that it stands for.
+//! - Images have 8 bits a channel; those of 16 are rounded.
+//! - Orthographic cameras keep their projection in the scene, but films and views are in perspective.
+//! - What reaches beyond [`LARGEST_COORDINATE`](crate::bvh::LARGEST_COORDINATE) is left out, triangle by triangle or node by node.
 //! - Without any light, a neutral sky lights the scene and the report says so.
 
 use std::collections::BTreeMap;

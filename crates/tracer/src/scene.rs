@@ -104,7 +104,7 @@ fn share<T>(parts: &mut [Arc<T>], known: &[Arc<T>], name: impl Fn(&T) -> &str, e
 pub struct Mesh {
     /// For reports.
     pub name: String,
-    /// Vertex positions, metres; finite.
+    /// Vertex positions, metres; finite, and within [`LARGEST_COORDINATE`](crate::bvh::LARGEST_COORDINATE).
     pub positions: Vec<Vec3>,
     /// Unit normals, one per vertex (import makes flat ones where the file has none).
     pub normals: Vec<Vec3>,
@@ -232,7 +232,7 @@ pub struct Material {
     pub normal_texture: Option<TextureRef>,
     /// Scales x and y of the normal map.
     pub normal_scale: f32,
-    /// Emitted radiance, linear Rec. 709, `emissive_strength` multiplied in.
+    /// Emitted radiance, linear Rec. 709, `emissive_strength` multiplied in; above 1e18 a film clamps it.
     pub emission: Vec3,
     /// RGB, sRGB.
     pub emissive_texture: Option<TextureRef>,
@@ -432,12 +432,15 @@ impl PunctualLight {
     }
 }
 
+/// Largest vertical angle of view of a camera, degrees: a perspective image of 180 has no edge.
+pub const LARGEST_YFOV_DEG: f32 = 170.0;
+
 /// What a glTF camera sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Projection {
     /// Full vertical angle in radians; aspect ratio width / height where the file gives one.
     Perspective {
-        /// Radians.
+        /// Radians, above 0 and at most [`LARGEST_YFOV_DEG`].
         yfov: f32,
         /// Width over height.
         aspect: Option<f32>,

@@ -3,11 +3,14 @@
 
 mod import_support;
 
+use std::sync::Arc;
+
 use glam::Vec3;
 use import_support::{File, floats, one_line_error, png};
 use serde_json::json;
+use tracer::bvh::{Blas, HierarchyKind, Tlas, TlasEntry};
 use tracer::import::{ImportError, ImportOptions, ImportWarning, load_glb_bytes, load_gltf};
-use tracer::scene::Environment;
+use tracer::scene::{Environment, Projection, Scene};
 
 fn load_bytes(bytes: &[u8]) -> String {
     one_line_error(load_glb_bytes("test.glb", bytes, &ImportOptions::default()))
@@ -147,6 +150,98 @@ fn geometry_that_cannot_be_rendered() {
     assert!(file.error().contains("NORMAL has 1 entries where POSITION has 3"));
 }
 
+/// Both ways in which a renderer may place each instance: in the world, and by a hierarchy of its own.
+fn build_hierarchies(scene: &Scene, kind: HierarchyKind) {
+    let mut entries = Vec::new();
+    for instance in &scene.instances {
+        let mesh = &scene.meshes[instance.mesh as usize];
+        let world_from_mesh = instance.world_from_mesh;
+        let in_world: Vec<Vec3> = mesh.positions.iter().map(|&p| world_from_mesh.transform_point3(p)).collect();
+        assert!(Blas::build(kind, &in_world, &mesh.triangles).bounds.min.is_finite());
+        let blas = Arc::new(Blas::build(kind, &mesh.positions, &mesh.triangles));
+        entries.push(TlasEntry { world_from_mesh, blas, source: None });
+    }
+    assert_eq!(Tlas::build(kind, &entries).order.len(), entries.len());
+}
+
+/// A vertex that nobody means, or a node that throws things out of the world, costs what hangs on it and not the scene.
+#[test]
+fn what_lies_beyond_all_measure_is_left_out() {
+    // Twenty triangles; a corner of the eighth and its neighbour is far away.
+    let with_corner = |corner: [f32; 3]| {
+        let mut file = File::empty();
+        let mut points: Vec<[f32; 3]> = (0..22u16).map(|i| [f32::from(i % 2), f32::from(i), 0.0]).collect();
+        points.push(corner);
+        let triangle = |i: u8| if i / 2 == 4 { [i, i + 1, 22] } else { [i, i + 1, i + 2] };
+        let indices: Vec<u8> = (0..20).flat_map(triangle).collect();
+        let positions = file.accessor(&floats(points.as_flattened()), 5126, "VEC3", 23);
+        let indices = file.accessor(&indices, 5121, "SCALAR", 60);
+        let normals = file.accessor(&floats(&[0., 0., 1.].repeat(23)), 5126, "VEC3", 23);
+        file.mesh(json!({"attributes": {"POSITION": positions, "NORMAL": normals}, "indices": indices}));
+        file.node(json!({"mesh": 0}));
+        file
+    };
+    for corner in [[f32::MAX; 3], [2e38, -2e38, 0.0], [0.0, -1e17, 0.0]] {
+        let (scene, report) = with_corner(corner).load().unwrap();
+        assert_eq!(scene.meshes[0].triangles.len(), 18, "{corner:?}");
+        assert_eq!(scene.bounds(), Some((Vec3::ZERO, Vec3::new(1.0, 21.0, 0.0))), "{corner:?}");
+        let said = "mesh 0 'm' primitive 0: dropped 2 triangles with corners beyond 1e15 m";
+        assert!(report.warnings.iter().any(|w| w.to_string() == said), "{:?}", report.warnings);
+        build_hierarchies(&scene, HierarchyKind::Wide);
+    }
+    let far = 1e12;
+    let (scene, _) = with_corner([0.0, far, 0.0]).load().unwrap();
+    assert_eq!(scene.meshes[0].triangles.len(), 20, "far, but within measure");
+
+    let mut file = File::triangle();
+    file.node(json!({"mesh": 0, "scale": [1e30, 1e30, 1e30], "name": "vast"}));
+    file.node(json!({"mesh": 0, "translation": [0, -1e20, 0], "name": "off"}));
+    let (scene, report) = file.load().unwrap();
+    assert_eq!((scene.instances.len(), scene.bounds()), (1, Some((Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0)))));
+    for node in ["node 1 'vast'", "node 2 'off'"] {
+        let said = format!("{node}: what it places reaches beyond 1e15 m and was dropped");
+        assert!(report.warnings.iter().any(|w| w.to_string() == said), "{:?}", report.warnings);
+    }
+    file.json["scenes"][0]["nodes"] = json!([1]);
+    assert!(file.error().contains("scene 0: has no triangles to render"));
+}
+
+#[test]
+fn angles_of_view_that_no_lens_has_are_clamped() {
+    let mut file = File::triangle();
+    for yfov in [4.0, 45.0, 3.0, 2.9, 0.7] {
+        let camera = file.push("cameras", json!({"type": "perspective", "perspective": {"yfov": yfov, "znear": 0.1}}));
+        file.node(json!({"camera": camera}));
+    }
+    let (scene, report) = file.load().unwrap();
+    let largest = 170f32.to_radians();
+    let expected = [largest, largest, largest, 2.9, 0.7].map(|yfov| Projection::Perspective { yfov, aspect: None });
+    assert_eq!(scene.cameras.iter().map(|camera| camera.projection).collect::<Vec<_>>(), expected);
+    let said: Vec<_> = report.warnings.iter().map(ToString::to_string).filter(|w| w.contains("'yfov'")).collect();
+    assert_eq!(said.len(), 3, "{said:?}");
+    assert_eq!(said[1], "camera 1: 'yfov' = 45 is out of range and was clamped");
+    file.json["cameras"][1]["perspective"]["yfov"] = json!(0);
+    assert!(file.error().contains("camera 1: property 'yfov' is not above 0"), "{}", file.error());
+}
+
+/// The strongest light that a film holds; products of factors that are finite need not be so.
+#[test]
+fn light_without_measure_is_clamped() {
+    let mut file = File::triangle();
+    let strength = json!({"KHR_materials_emissive_strength": {"emissiveStrength": 1e30}});
+    file.material(json!({"emissiveFactor": [1e30, 0, 0], "extensions": strength}));
+    let lights = json!([{"type": "point", "intensity": 1e30}, {"type": "point", "intensity": 2}]);
+    file.json["extensions"] = json!({"KHR_lights_punctual": {"lights": lights}});
+    for light in 0..2 {
+        file.node(json!({"extensions": {"KHR_lights_punctual": {"light": light}}}));
+    }
+    let (scene, report) = file.load().unwrap();
+    assert_eq!(scene.materials[0].emission, Vec3::new(1e18, 0.0, 0.0));
+    assert_eq!(scene.lights.iter().map(|light| light.intensity.x).collect::<Vec<_>>(), [1e18, 2.0]);
+    let clamped = report.warnings.iter().filter(|w| matches!(w, ImportWarning::ValueClamped { .. }));
+    assert_eq!(clamped.count(), 2, "{:?}", report.warnings);
+}
+
 #[test]
 fn names_cannot_break_the_line() {
     let mut file = File::triangle();
@@ -281,10 +376,14 @@ fn lightless_scenes_get_a_sky_and_lit_ones_none() {
     emissive.material(json!({"emissiveFactor": [0, 1, 0]}));
     let mut hidden = emissive.clone();
     hidden.json["nodes"][0]["extensions"] = json!({"KHR_node_visibility": {"visible": false}});
+    // What is unlit shows its base colour and lights nothing.
+    let mut unlit = File::triangle();
+    unlit.material(json!({"emissiveFactor": [0, 1, 0], "extensions": {"KHR_materials_unlit": {}}}));
     let mut punctual = File::triangle();
     punctual.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [{"type": "point"}]}});
     punctual.node(json!({"extensions": {"KHR_lights_punctual": {"light": 0}}}));
-    for (file, expected) in [(emissive, Vec3::ZERO), (hidden, Vec3::splat(0.8)), (punctual, Vec3::ZERO)] {
+    let sky = Vec3::splat(0.8);
+    for (file, expected) in [(emissive, Vec3::ZERO), (hidden, sky), (unlit, sky), (punctual, Vec3::ZERO)] {
         assert!(matches!(file.scene().environment, Environment::Constant(sky) if sky == expected));
     }
 }
@@ -420,6 +519,7 @@ fn mutated_files_never_panic() {
                     assert!(mesh.triangles.as_flattened().iter().all(|&v| (v as usize) < mesh.positions.len()));
                 }
                 assert!(scene.instances.iter().all(|i| i.world_from_mesh.inverse().is_finite()), "round {round}");
+                build_hierarchies(&scene, HierarchyKind::Wide);
             }
             Err(error) => {
                 failed += 1;

@@ -471,18 +471,58 @@ fn specular_glossiness_keeps_its_reflectance() {
 }
 
 #[test]
-fn sixteen_bit_normal_maps_are_rounded_with_a_word() {
+fn sixteen_bit_images_are_rounded_with_a_word() {
     let mut bytes = std::io::Cursor::new(Vec::new());
     let image = image::ImageBuffer::<image::Rgb<u16>, _>::from_pixel(2, 1, image::Rgb([32768, 32768, 65535]));
     image::DynamicImage::ImageRgb16(image).write_to(&mut bytes, image::ImageFormat::Png).unwrap();
     let mut file = File::triangle().with_uvs();
     let view = file.view(bytes.get_ref());
-    file.push("images", json!({"bufferView": view}));
-    file.push("textures", json!({"source": 0}));
-    file.material(json!({"normalTexture": {"index": 0}}));
+    for image in 0..3 {
+        file.push("images", json!({"bufferView": view}));
+        file.push("textures", json!({"source": image}));
+    }
+    let [normal, color, data] = [0, 1, 2].map(|texture| json!({"index": texture}));
+    let maps = json!({"baseColorTexture": color, "metallicRoughnessTexture": data});
+    file.material(json!({"normalTexture": normal, "pbrMetallicRoughness": maps}));
     let (scene, report) = file.load().unwrap();
     assert_eq!(scene.textures[0].texels, [[128, 128, 255, 255]; 2]);
     assert!(report.warnings.iter().any(|w| matches!(w, ImportWarning::NormalMapRounded { .. })));
+    let said: Vec<_> = report.warnings.iter().map(ToString::to_string).filter(|w| w.contains("16 bits")).collect();
+    assert_eq!(said, ["2 images of 16 bits a channel were rounded to 8 bits"]);
+}
+
+#[test]
+fn what_has_no_effect_is_said_once_a_kind() {
+    let mut file = File::triangle().with_uvs();
+    let slot = json!({"index": file.texture(1, 1, [255; 4])});
+    let volume = json!({"KHR_materials_volume": {"thicknessFactor": 1, "thicknessTexture": slot}});
+    let material = json!({"occlusionTexture": slot, "extensions": volume});
+    file.material(material.clone());
+    let second = file.push("materials", material);
+    let mesh = file.mesh(json!({"attributes": {"POSITION": 0, "TEXCOORD_0": 2}, "material": second}));
+    file.node(json!({"mesh": mesh}));
+    let lights = json!([{"type": "point", "range": 5}, {"type": "point"}]);
+    file.json["extensions"] = json!({"KHR_lights_punctual": {"lights": lights}});
+    for light in 0..2 {
+        file.node(json!({"extensions": {"KHR_lights_punctual": {"light": light}}}));
+    }
+    file.push(
+        "cameras",
+        json!({"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "zfar": 9, "znear": 0}}),
+    );
+    for _ in 0..3 {
+        file.node(json!({"camera": 0}));
+    }
+    let (_, report) = file.load().unwrap();
+    let said: Vec<_> = report.warnings.iter().map(ToString::to_string).collect();
+    assert_eq!(
+        said,
+        [
+            "thicknessTexture has no effect (2x): a solid is as thick as its mesh",
+            "range has no effect (1x): light falls off by the square of the distance alone",
+            "an orthographic projection has no effect (3x): such cameras are shown in perspective",
+        ]
+    );
 }
 
 #[test]

@@ -77,7 +77,7 @@ fn text(scene: &Scene, report: &ImportReport) -> String {
 }
 
 fn emissive(scene: &Scene) -> usize {
-    scene.materials.iter().filter(|material| material.emission.max_element() > 0.0).count()
+    scene.materials.iter().filter(|material| material.emits()).count()
 }
 
 fn kind(kind: &PunctualKind) -> &'static str {

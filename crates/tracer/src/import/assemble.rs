@@ -12,6 +12,7 @@ use super::hash_meshes;
 use super::material;
 use super::primitive::Built;
 use super::report::{ImportReport, ImportWarning, SceneNode};
+use crate::bvh::LARGEST_COORDINATE;
 use crate::scene::{Backdrop, Environment, Instance, Material, Mesh, Scene, Texture};
 
 /// A scene is stored relative to its centre when that is farther from the file's origin than this many diagonals of its
@@ -54,11 +55,15 @@ impl Parts<'_> {
             }));
         }
 
-        let singular = drop_singular(&mut graph.placements, &mesh_of_request);
-        report.warnings.extend(
-            singular.into_iter().map(|n| ImportWarning::SingularTransform { place: document.nodes[n].place.clone() }),
-        );
         let boxes: Vec<[Vec3; 2]> = meshes.iter().map(bounds).collect();
+        let place = |node: usize| document.nodes[node].place.clone();
+        let singular = drop_placements(&mut graph.placements, &mesh_of_request, |_, placed| is_invertible(placed));
+        report.warnings.extend(singular.into_iter().map(|n| ImportWarning::SingularTransform { place: place(n) }));
+        let far = drop_placements(&mut graph.placements, &mesh_of_request, |mesh, placed| {
+            let reach = |[low, high]: [DVec3; 2]| low.abs().max(high.abs()).max_element();
+            world_bounds([(mesh, placed)].into_iter(), &boxes).map(reach) <= Some(f64::from(LARGEST_COORDINATE))
+        });
+        report.warnings.extend(far.into_iter().map(|n| ImportWarning::FarPlacement { place: place(n) }));
         let placed = graph.placements.iter().filter_map(|p| Some((mesh_of_request[p.request]?, p.world_from_mesh)));
         let bounds_in_file = world_bounds(placed, &boxes);
         let origin_in_file = bounds_in_file.map_or(DVec3::ZERO, rebased_origin);
@@ -137,7 +142,7 @@ fn scene_place(report: &ImportReport) -> String {
 }
 
 fn has_light(scene: &Scene) -> bool {
-    let emits = |i: &Instance| i.visible && scene.materials[i.material as usize].emission != Vec3::ZERO;
+    let emits = |i: &Instance| i.visible && scene.materials[i.material as usize].emits();
     scene.lights.iter().any(|l| l.intensity != Vec3::ZERO) || scene.instances.iter().any(emits)
 }
 
@@ -162,15 +167,20 @@ fn warn_of_missing_uvs(
     }
 }
 
-/// Removes placements that cannot be inverted in f32 and those without a mesh; returns the nodes of the former.
-fn drop_singular(placements: &mut Vec<Placement>, mesh_of_request: &[Option<usize>]) -> Vec<usize> {
+/// Removes placements of a mesh that are not fine and those without a mesh; returns the nodes of the former.
+fn drop_placements(
+    placements: &mut Vec<Placement>,
+    mesh_of_request: &[Option<usize>],
+    is_fine: impl Fn(usize, DAffine3) -> bool,
+) -> Vec<usize> {
     let mut nodes = Vec::new();
     placements.retain(|p| {
-        let is_fine = is_invertible(p.world_from_mesh);
-        if !is_fine && mesh_of_request[p.request].is_some() {
+        let Some(mesh) = mesh_of_request[p.request] else { return false };
+        let keeps = is_fine(mesh, p.world_from_mesh);
+        if !keeps {
             nodes.push(p.node);
         }
-        is_fine && mesh_of_request[p.request].is_some()
+        keeps
     });
     nodes.dedup();
     nodes

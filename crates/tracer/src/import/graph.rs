@@ -9,11 +9,13 @@ use super::accessor::Data;
 use super::document::Primitive;
 use super::error::{ContentError, Fault};
 use super::json::Object;
+use super::material::LARGEST_RADIANCE;
 use super::pose::{self, Pose};
 use super::primitive::{MeshKey, MeshRequest, mode_without_triangles};
-use super::report::ImportWarning;
+use super::report::{ImportWarning, ignore};
 use super::skin::JointMatrices;
-use crate::scene::{Camera, Projection, PunctualKind, PunctualLight};
+use crate::bvh::LARGEST_COORDINATE;
+use crate::scene::{Camera, LARGEST_YFOV_DEG, Projection, PunctualKind, PunctualLight};
 
 /// Most instances of a scene.
 const MAX_INSTANCES: u64 = 1 << 22;
@@ -186,10 +188,16 @@ impl Graph<'_> {
             Some("perspective") => {
                 let p = part("perspective")?;
                 let aspect = p.number("aspectRatio")?.map(narrow).filter(|a| *a > 0.0 && a.is_finite());
-                Projection::Perspective { yfov: positive(&p, "yfov")?, aspect }
+                let (yfov, largest) = (positive(&p, "yfov")?, LARGEST_YFOV_DEG.to_radians());
+                if yfov > largest {
+                    let (place, key) = (o.place.clone(), "yfov".to_owned());
+                    warnings.push(ImportWarning::ValueClamped { place, key, value: f64::from(yfov) });
+                }
+                Projection::Perspective { yfov: yfov.min(largest), aspect }
             }
             Some("orthographic") => {
                 let p = part("orthographic")?;
+                ignore(warnings, "an orthographic projection", "such cameras are shown in perspective");
                 // Negative magnifications mirror the picture in some viewers; the specification only warns.
                 let magnitude = |key| Ok(narrow(p.number(key)?.ok_or_else(|| p.bad(key, "is missing"))?.abs()));
                 Projection::Orthographic { xmag: magnitude("xmag")?, ymag: magnitude("ymag")? }
@@ -231,11 +239,15 @@ impl Graph<'_> {
         };
         let color = o.numbers::<3>("color")?.unwrap_or([1.0; 3]);
         let intensity = o.number("intensity")?.unwrap_or(1.0);
-        if intensity < 0.0 {
+        if !(0.0..=LARGEST_RADIANCE).contains(&intensity) {
             let (place, key) = (o.place.clone(), "intensity".to_owned());
             warnings.push(ImportWarning::ValueClamped { place, key, value: intensity });
         }
-        let intensity = Vec3::from_array(color.map(|c| narrow(c.max(0.0) * intensity.max(0.0))));
+        if o.map.contains_key("range") {
+            ignore(warnings, "range", "light falls off by the square of the distance alone");
+        }
+        let intensity = intensity.clamp(0.0, LARGEST_RADIANCE);
+        let intensity = Vec3::from_array(color.map(|c| narrow((c.max(0.0) * intensity).min(LARGEST_RADIANCE))));
         let name = if node_name.is_empty() { o.name() } else { node_name }.to_owned();
         let light = PunctualLight { name, kind, intensity, position: Vec3::ZERO, rotation: rotation_of(world) };
         self.lights.push(Posed { item: light, position_in_world: finite(world.translation) });
@@ -244,7 +256,8 @@ impl Graph<'_> {
 }
 
 fn finite(v: DVec3) -> DVec3 {
-    if v.is_finite() { v } else { DVec3::ZERO }
+    let limit = DVec3::splat(f64::from(LARGEST_COORDINATE));
+    if v.is_finite() { v.clamp(-limit, limit) } else { DVec3::ZERO }
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "scene data is f32")]

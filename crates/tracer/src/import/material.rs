@@ -5,7 +5,7 @@ use glam::{Vec3, Vec4};
 use super::document::Document;
 use super::error::Fault;
 use super::json::Object;
-use super::report::ImportWarning;
+use super::report::{ImportWarning, ignore};
 use super::texture::{TextureTable, TextureUse};
 use crate::scene::{AlphaMode, Material, TextureRef};
 
@@ -14,6 +14,9 @@ const F0_DIELECTRIC: f32 = 0.04;
 
 /// Stands for KHR_materials_ior's special value 0, which means F0 = 1: here F0 = 0.9996, and refraction stays finite.
 const INFINITE_IOR: f32 = 1e4;
+
+/// Largest radiance, and intensity of a light without extent: what a film can hold.
+pub(super) const LARGEST_RADIANCE: f64 = 1e18;
 
 /// Reads one material; its textures are added to `table`.
 pub(super) fn parse(
@@ -56,9 +59,12 @@ impl Reader<'_, '_> {
             // A texture that was left out must not light the room.
             m.emission = Vec3::ZERO;
         }
-        if let Some(strength) = o.extension("KHR_materials_emissive_strength")? {
-            m.emission *= self.at_least(&strength, "emissiveStrength", 1.0, 0.0)?;
-        }
+        let strength = match o.extension("KHR_materials_emissive_strength")? {
+            Some(strength) => self.at_least(&strength, "emissiveStrength", 1.0, 0.0)?,
+            None => 1.0,
+        };
+        let radiance = (m.emission.as_dvec3() * f64::from(strength)).to_array();
+        m.emission = Vec3::from_array(radiance.map(|c| self.clamped(o, "emissiveFactor", c, 0.0, LARGEST_RADIANCE)));
         m.alpha_mode = match o.string("alphaMode")? {
             Some("MASK") => AlphaMode::Mask { cutoff: self.at_least(o, "alphaCutoff", 0.5, 0.0)? },
             Some("BLEND") => AlphaMode::Blend,
@@ -128,6 +134,9 @@ impl Reader<'_, '_> {
         }
         if let Some(o) = object.extension("KHR_materials_volume")? {
             m.thickness = self.at_least(&o, "thicknessFactor", 0.0, 0.0)?;
+            if m.thickness > 0.0 && o.map.contains_key("thicknessTexture") {
+                ignore(self.warnings, "thicknessTexture", "a solid is as thick as its mesh");
+            }
             let distance = scalar(Some(&o), "attenuationDistance", f32::INFINITY)?;
             // 0 is not allowed by the specification and some writers mean "none" by it.
             m.attenuation_distance = if distance > 0.0 { distance } else { f32::INFINITY };

@@ -11,6 +11,7 @@ use super::error::{ContentError, Fault};
 use super::report::ImportWarning;
 use super::skin::{Influences, JointMatrices};
 use super::tangent;
+use crate::bvh::LARGEST_COORDINATE;
 use crate::scene::{ContentHash, Mesh};
 
 const TRIANGLES: u64 = 4;
@@ -124,6 +125,10 @@ pub(super) fn build(data: &Data<'_>, request: &MeshRequest<'_>) -> Result<Built,
     let mut vertices = reader.vertices(request, &mut warnings)?;
     let mut triangles = reader.triangles(vertices.positions.len())?;
 
+    let count = drop_far(&mut vertices.positions, &mut triangles);
+    if count > 0 {
+        warnings.push(ImportWarning::FarTriangles { place: primitive.place.clone(), count });
+    }
     let before = triangles.len();
     triangles.retain(|&t| face_normal(&vertices.positions, t) != DVec3::ZERO);
     let degenerate_triangles = before - triangles.len();
@@ -350,6 +355,19 @@ fn cofactor(m: DMat3) -> DMat3 {
 fn face_normal(positions: &[Vec3], triangle: [u32; 3]) -> DVec3 {
     let [a, b, c] = triangle.map(|v| positions[v as usize].as_dvec3());
     (b - a).cross(c - a)
+}
+
+/// Drops triangles that reach beyond measure, and moves such vertices to others, whose box counts; returns how many triangles.
+fn drop_far(positions: &mut [Vec3], triangles: &mut Vec<[u32; 3]>) -> usize {
+    let is_near = |p: Vec3| p.abs().max_element() <= LARGEST_COORDINATE;
+    if positions.iter().all(|&p| is_near(p)) {
+        return 0;
+    }
+    let before = triangles.len();
+    triangles.retain(|t| t.iter().all(|&v| is_near(positions[v as usize])));
+    let kept = triangles.first().map_or(Vec3::ZERO, |&[v, ..]| positions[v as usize]);
+    positions.iter_mut().filter(|p| !is_near(**p)).for_each(|p| *p = kept);
+    before - triangles.len()
 }
 
 fn flat_normals(vertices: &mut Vertices, triangles: &mut [[u32; 3]]) {

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use glam::Affine3A;
 
+use crate::bvh::LARGEST_COORDINATE;
+
 /// What was read, ignored, repaired or replaced.
 #[derive(Clone, Debug, Default)]
 pub struct ImportReport {
@@ -84,6 +86,22 @@ pub enum ImportWarning {
         /// Which image.
         place: String,
     },
+    /// Other 16-bit images were rounded to 8 bits.
+    #[error("{count} images of 16 bits a channel were rounded to 8 bits")]
+    ImagesRounded {
+        /// How many.
+        count: usize,
+    },
+    /// A property that changes nothing here; all places that have it are one entry.
+    #[error("{property} has no effect ({count}x): {reason}")]
+    PropertyIgnored {
+        /// Its name in the file.
+        property: &'static str,
+        /// How often it was met.
+        count: usize,
+        /// What counts in its place.
+        reason: &'static str,
+    },
     /// Triangles without area were dropped.
     #[error("{place}: dropped {count} triangles without area")]
     DegenerateTriangles {
@@ -91,6 +109,20 @@ pub enum ImportWarning {
         place: String,
         /// How many.
         count: usize,
+    },
+    /// Triangles that reach beyond [`LARGEST_COORDINATE`] in their mesh were dropped: nobody means them.
+    #[error("{place}: dropped {count} triangles with corners beyond {limit:e} m", limit = LARGEST_COORDINATE)]
+    FarTriangles {
+        /// Which primitive.
+        place: String,
+        /// How many.
+        count: usize,
+    },
+    /// What a node places reaches beyond [`LARGEST_COORDINATE`].
+    #[error("{place}: what it places reaches beyond {limit:e} m and was dropped", limit = LARGEST_COORDINATE)]
+    FarPlacement {
+        /// Which node.
+        place: String,
     },
     /// Zero or non-finite normals were replaced by those of the adjoining triangles.
     #[error("{place}: repaired {count} normals that were zero or not finite")]
@@ -171,4 +203,16 @@ pub enum ImportWarning {
     /// Nothing in the file gives light.
     #[error("the file has no light: a neutral sky of radiance 0.8 lights it")]
     NoLight,
+}
+
+/// Adds a [`ImportWarning::PropertyIgnored`], or counts it.
+pub(super) fn ignore(warnings: &mut Vec<ImportWarning>, ignored: &'static str, reason: &'static str) {
+    let known = warnings.iter_mut().find_map(|warning| match warning {
+        ImportWarning::PropertyIgnored { property, count, .. } if *property == ignored => Some(count),
+        _ => None,
+    });
+    match known {
+        Some(count) => *count += 1,
+        None => warnings.push(ImportWarning::PropertyIgnored { property: ignored, count: 1, reason }),
+    }
 }

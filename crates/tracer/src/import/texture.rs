@@ -120,12 +120,19 @@ impl TextureTable {
 
         let mut textures: Vec<Option<Arc<Texture>>> = vec![None; self.requests.len()];
         let (mut warnings, mut files) = (Vec::new(), Vec::new());
+        let mut rounded = 0;
         for (image, (image_textures, image_warnings)) in uses_of_image.iter().zip(decoded) {
             for (&index, texture) in image.1.iter().zip(image_textures) {
                 textures[index] = Some(texture);
             }
-            warnings.extend(image_warnings);
+            let (of_kind, others): (Vec<_>, Vec<_>) =
+                image_warnings.into_iter().partition(|w| matches!(w, ImportWarning::ImagesRounded { .. }));
+            rounded += of_kind.len();
+            warnings.extend(others);
             files.extend(data.document.images[image.0].uri.and_then(|uri| folder.companion(uri)));
+        }
+        if rounded > 0 {
+            warnings.push(ImportWarning::ImagesRounded { count: rounded });
         }
         Ok(Decoded { textures: textures.into_iter().flatten().collect(), warnings, files })
     }
@@ -148,10 +155,10 @@ impl TextureTable {
                 None
             }
         };
-        if pixels.as_ref().is_some_and(|p| p.was_16_bit)
-            && uses.iter().any(|&index| self.requests[index].1 == TextureUse::Normal)
-        {
-            warnings.push(ImportWarning::NormalMapRounded { place });
+        if pixels.as_ref().is_some_and(|p| p.was_16_bit) {
+            let is_normal_map = uses.iter().any(|&index| self.requests[index].1 == TextureUse::Normal);
+            let rounded = ImportWarning::ImagesRounded { count: 1 };
+            warnings.push(if is_normal_map { ImportWarning::NormalMapRounded { place } } else { rounded });
         }
         let (width, height) = pixels.as_ref().map_or((1, 1), |p| (p.width, p.height));
         let mut shared = pixels.map(|p| p.texels);
