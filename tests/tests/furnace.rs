@@ -21,7 +21,7 @@ use tracer::{
 /// Samples of a case and channel.
 const SAMPLES: u32 = 1 << 17;
 /// Standard errors above this would prove little.
-const LARGEST_ERROR: f64 = 6e-3;
+const LARGEST_ERROR: f64 = 5.5e-3;
 /// The last two lie between entries of the albedo tables.
 const ROUGHNESS: [f32; 8] = [0.0, 1e-4, 0.1, 0.3, 0.6, 1.0, 0.12, 0.45];
 const COSINES: [f32; 5] = [1.0, 0.7, 0.3, 0.1, 0.02];
@@ -267,6 +267,7 @@ const INTRODUCTION: &str = "# White furnace
 Albedo of white materials: the mean weight of 131,072 BSDF samples (the largest of the three channels), by the cosine between
 the outgoing direction and the normal. Written by `FOVEA_WRITE_REPORTS=1 cargo test -p fovea-tests --test furnace`; the test
 asserts that nothing is above 1 + 3 standard errors, and that all but the anisotropic and iridescent lobes are within 1 % + 3 standard errors of 1.
+Standard errors are 0.0052 at most (sheen), in 132 of the 960 values above 0.001; beyond 0.0055 the test fails.
 
 Lobes that compensate for multiple scattering among microfacets: reflection off metals and dielectrics, thin transmission, rough
 glass from both sides, clearcoat. Sheen and the layers below every lobe are scaled by directional albedos. The albedo tables are
