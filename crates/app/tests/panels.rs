@@ -31,6 +31,8 @@ use fovea_app::session::{self, Source};
 use tracer::scene::Backdrop;
 use tracer::view::{DebugScale, DebugView, Histogram};
 
+#[path = "panels/glyphs.rs"]
+mod glyphs;
 #[path = "panels/properties.rs"]
 mod properties;
 #[path = "panels/split.rs"]

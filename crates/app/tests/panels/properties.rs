@@ -4,7 +4,9 @@ use egui::{Event, Key, Modifiers};
 use fovea_app::preview::editor::{Editor, properties};
 use fovea_app::preview::navigation::Standpoint;
 use fovea_app::view::View;
-use glam::{Quat, Vec3};
+use glam::{Affine3A, Quat, Vec3};
+use tracer::import::SceneNode;
+use tracer::scene::Instance;
 
 use super::*;
 
@@ -204,4 +206,42 @@ fn held_angles_give_way_to_a_rotation_from_elsewhere() {
     let angles = ["X", "Y", "Z"].map(|axis| shown(&harness, &format!("Rotation {axis}")).to_radians() as f32);
     let found = Quat::from_euler(glam::EulerRot::ZYX, angles[2], angles[1], angles[0]);
     assert!(glam::Mat3A::from_quat(found).abs_diff_eq(expected, 1e-3), "{angles:?}");
+}
+
+/// A built-in scene with a group of so many copies of its first object.
+fn with_group(count: u32) -> (Document, u32) {
+    let mut loaded = session::load(&Source::BuiltIn, &args().scene).unwrap();
+    let mut scene = (*loaded.scene).clone();
+    let group = loaded.nodes.len() as u32;
+    loaded.nodes.push(SceneNode { name: "group".into(), parent: None, world_from_node: Affine3A::IDENTITY });
+    for node in group + 1..=group + count {
+        loaded.nodes.push(SceneNode { name: String::new(), parent: Some(group), world_from_node: Affine3A::IDENTITY });
+        let copy = Instance { node, ..scene.instances[0].clone() };
+        scene.instances.push(copy);
+    }
+    loaded.scene = Arc::new(scene);
+    (Document::new(&loaded), group)
+}
+
+/// Each frame looked for every object in a list of all of them.
+#[test]
+fn a_group_of_fifty_thousand_objects_is_shown_at_once() {
+    let (document, group) = with_group(50_000);
+    let material = document.version().materials[document.version().instances[0].material as usize].name.clone();
+    let state = PanelState { selected: Some(Part::Node(group)), ..PanelState::default() };
+    let mut harness = scene_harness(document, state);
+    assert!(harness.query_by_label(&material).is_some());
+    // The fastest of several: other programs take their share of a frame.
+    let frame = |harness: &mut Harness<'_, Scene>| {
+        let start = Instant::now();
+        harness.run_steps(1);
+        start.elapsed()
+    };
+    let fastest = (0..8).map(|_| frame(&mut harness)).min().unwrap();
+    assert!(fastest < Duration::from_millis(50), "{fastest:?}");
+    // Another version is another list.
+    let node = harness.state().document.tree().children(group)[0];
+    harness.state_mut().panel.selected = Some(Part::Node(node));
+    harness.run_steps(2);
+    assert!(harness.query_by_label(&material).is_some());
 }

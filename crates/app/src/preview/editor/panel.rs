@@ -5,10 +5,13 @@
 use std::collections::HashMap;
 use std::path::PathBuf;
 
-use egui::{Align2, Area, Context, Id, Response, RichText, ScrollArea, TextEdit, Ui, WidgetInfo, accesskit};
+use egui::{
+    Align2, Area, Context, Id, Response, RichText, ScrollArea, Sense, TextEdit, Ui, WidgetInfo, accesskit,
+    collapsing_header,
+};
 
 use super::gizmo::GizmoMode;
-use super::properties::{self, DarkColor, HeldAngles};
+use super::properties::{self, DarkColor, HeldAngles, MaterialsOf};
 use crate::document::edits::{Edit, Part};
 use crate::document::{Document, Gesture};
 use crate::preview::theme;
@@ -17,6 +20,8 @@ use crate::preview::theme;
 pub const PANEL_WIDTH: f32 = 272.0;
 /// Height of a row of a list, points.
 const ROW_HEIGHT: f32 = 19.0;
+/// Side of what opens and closes a branch, points.
+const ICON_SIZE: f32 = 14.0;
 /// A tree with more nodes than this starts with closed branches.
 const OPEN_AT_FIRST: usize = 200;
 
@@ -54,6 +59,8 @@ pub struct PanelState {
     pub environment: String,
     /// A rotation's angles while they are set.
     pub angles: Option<HeldAngles>,
+    /// The materials of a node that was shown last.
+    pub materials: Option<MaterialsOf>,
     /// Colours whose strength is 0: the scene does not know them any more.
     pub dark: Vec<DarkColor>,
     /// The list is scrolled to what is selected.
@@ -208,15 +215,15 @@ fn show_row(
         ui.add_space(12.0 * f32::from(row.depth));
         match row.open {
             Some(open) => {
-                let text = if open { "\u{23f7}" } else { "\u{23f5}" };
-                let response = ui.add(egui::Button::new(RichText::new(text).small()).frame(false));
+                let (_, response) = ui.allocate_exact_size(egui::Vec2::splat(ICON_SIZE), Sense::click());
+                collapsing_header::paint_default_icon(ui, if open { 1.0 } else { 0.0 }, &response);
                 let verb = if open { "Close" } else { "Open" };
                 name_button(&response, format!("{verb} {}", row.name));
                 if response.clicked() {
                     state.branches.insert(node, !open);
                 }
             }
-            None => ui.add_space(12.0),
+            None => ui.add_space(ICON_SIZE),
         }
     }
     let selected = match row.camera {

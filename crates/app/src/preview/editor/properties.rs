@@ -1,10 +1,12 @@
 //! The properties of what is selected, as fields, sliders and colours.
 
+use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
+use std::sync::{Arc, Weak};
 
 use egui::{DragValue, Grid, Response, RichText, Slider, SliderClamping, Ui};
 use glam::{Affine3A, EulerRot, Mat3A, Quat, Vec3};
-use tracer::scene::{Backdrop, Environment, PunctualKind};
+use tracer::scene::{Backdrop, Environment, PunctualKind, Scene};
 
 use super::gizmo::GizmoMode;
 use super::panel::{Action, PanelState, node_name, part_name};
@@ -108,7 +110,7 @@ fn show_node(ui: &mut Ui, document: &Document, node: u32, state: &mut PanelState
             ui.end_row();
         }
     });
-    materials_of(ui, document, node, actions);
+    materials_of(ui, document, node, state, actions);
 }
 
 /// The angles of a rotation while a person sets them: other angles mean the same rotation, and those would take their place
@@ -132,16 +134,36 @@ fn name_field(response: &Response, name: String) {
     response.ctx.accesskit_node_builder(response.id, |node| node.set_label(name));
 }
 
-fn materials_of(ui: &mut Ui, document: &Document, node: u32, actions: &mut Vec<Action>) {
+/// The materials of all that hangs on a node, found once for a version: a group may hold a hundred thousand objects.
+#[derive(Clone, Debug)]
+pub struct MaterialsOf {
+    version: Weak<Scene>,
+    node: u32,
+    /// By index, each once.
+    materials: Vec<u32>,
+}
+
+impl MaterialsOf {
+    fn new(document: &Document, node: u32) -> Self {
+        let version = document.version();
+        let below: BTreeSet<u32> = document.tree().below(node).into_iter().collect();
+        let instances = version.instances.iter().filter(|instance| below.contains(&instance.node));
+        let materials: BTreeSet<u32> = instances.map(|instance| instance.material).collect();
+        Self { version: Arc::downgrade(version), node, materials: materials.into_iter().collect() }
+    }
+
+    fn is_of(&self, document: &Document, node: u32) -> bool {
+        self.node == node && std::ptr::eq(self.version.as_ptr(), Arc::as_ptr(document.version()))
+    }
+}
+
+fn materials_of(ui: &mut Ui, document: &Document, node: u32, state: &mut PanelState, actions: &mut Vec<Action>) {
     let version = document.version();
-    let below = document.tree().below(node);
-    let mut materials: Vec<u32> =
-        version.instances.iter().filter(|i| below.contains(&i.node)).map(|instance| instance.material).collect();
-    materials.sort_unstable();
-    materials.dedup();
+    let known = state.materials.take().filter(|known| known.is_of(document, node));
+    let found = state.materials.insert(known.unwrap_or_else(|| MaterialsOf::new(document, node)));
     ui.horizontal_wrapped(|ui| {
         ui.label(RichText::new("Materials").weak());
-        for index in materials.into_iter().take(12) {
+        for index in found.materials.iter().copied().take(12) {
             let Some(material) = version.materials.get(index as usize) else { continue };
             if ui.button(part_name(&material.name, "material", index)).clicked() {
                 actions.push(Action::Select(Some(Part::Material(index))));
