@@ -15,7 +15,7 @@ use crate::gaze::hub::{GazeHub, HubReport, Target};
 use crate::gaze::profile::{self, Profile, Profiles};
 use crate::gaze::source::Calibration;
 use crate::gaze::spec::SourceSpec;
-use crate::gaze::validation::{DotRun, Outcome, Purpose};
+use crate::gaze::validation::{Accuracy, DotRun, Outcome, Purpose};
 use crate::output::free_name;
 use crate::screen::ScreenGeometry;
 use crate::view::View;
@@ -26,6 +26,8 @@ const LOOK: Duration = Duration::from_millis(500);
 const NOTE: Duration = Duration::from_secs(5);
 /// How often the window is drawn for a tracker's gaze; tracing goes by every sample all the same.
 const FOLLOW: Duration = Duration::from_millis(50);
+/// Dots of a validation without which it says too little about the picture: the worst places are its corners.
+const FEWEST_DOTS: usize = 7;
 /// Changed millimetres are kept after they have rested so long.
 const RESTED: Duration = Duration::from_secs(2);
 
@@ -207,6 +209,10 @@ impl GazeControl {
             }
             Outcome::Drift(Err(refused)) => format!("no correction: {refused}"),
             Outcome::Validation(result) if result.dots == 0 => "no valid gaze at any dot".into(),
+            Outcome::Validation(result) if result.dots < FEWEST_DOTS => {
+                let Accuracy { accuracy_deg, dots, .. } = result;
+                format!("accuracy {accuracy_deg:.2} degrees at {dots} of 9 dots: not kept, which takes {FEWEST_DOTS}")
+            }
             Outcome::Validation(result) => {
                 let (accuracy_deg, precision_deg) = (Some(result.accuracy_deg), Some(result.precision_deg));
                 self.keep(Profile { accuracy_deg, precision_deg, ..self.profile }, now);
@@ -359,8 +365,48 @@ fn screen(
 }
 
 #[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
+    use std::ffi::OsString;
+
     use super::*;
+    use crate::cli;
+
+    /// A validation with a tracker that sees the eye until `secs`; the accuracy that is kept, and what is said.
+    fn validated(name: &str, secs: f64) -> (Option<f64>, String) {
+        let trace = std::env::temp_dir().join(format!("fovea-validated-{name}-{}.csv", std::process::id()));
+        let rows = (0..60 * 60).map(|step| f64::from(step) / 60.0);
+        let rows = rows.map(|time| format!("{time:.6},1,2,{}\n", u8::from(time < secs)));
+        std::fs::write(&trace, format!("# gaze-trace v1; space=view_deg\n{}", rows.collect::<String>())).unwrap();
+        let line = ["fovea".into(), "--gaze".into(), OsString::from(format!("trace:{}", trace.display()))];
+        let args = cli::parse(line).unwrap().preview;
+        let hub = Arc::new(GazeHub::new(&args.gaze.sources, None).unwrap());
+        std::fs::remove_file(trace).unwrap();
+        let mut control = GazeControl::new(hub, &args);
+        control.profile = Profile { accuracy_deg: Some(0.5), ..Profile::default() };
+        let view = View { yaw: 0.0, pitch: 0.0, tan_half: glam::Vec2::ONE };
+        let start = Instant::now();
+        control.start_dots(Purpose::Validation, start);
+        for step in 1..60 * 60 {
+            let now = start + Duration::from_micros(16_667) * step;
+            control.frame(now, WindowPlace::default(), view, None);
+            if !control.shows_dots() {
+                return (control.profile.accuracy_deg, control.outcome.unwrap());
+            }
+        }
+        panic!("the dots never end");
+    }
+
+    #[test]
+    fn a_validation_of_few_dots_leaves_the_accuracy_as_it_was() {
+        let (kept, said) = validated("one", 2.0);
+        assert_eq!(kept, Some(0.5));
+        assert!(said.contains("1 of 9 dots: not kept"), "{said}");
+        let (kept, said) = validated("none", 0.0);
+        assert_eq!((kept, said.as_str()), (Some(0.5), "no valid gaze at any dot"));
+        let (kept, said) = validated("all", 60.0);
+        assert!(kept.is_some_and(|kept| kept > 1.0) && said.contains("9 of 9 dots"), "{kept:?} {said}");
+    }
 
     #[test]
     fn what_was_set_goes_before_what_the_monitor_says() {
