@@ -165,7 +165,7 @@ fn the_fovea_follows_the_pointer_and_most_of_the_time_goes_into_tracing() {
             display.xdotool(&format!("mousemove {gaze} {y}"));
             std::thread::sleep(Duration::from_millis(500));
             // The film starts again, so that nothing in it is older than the gaze; the picture shows its density.
-            display.xdotool("key r");
+            display.xdotool("key ctrl+r");
             display.xdotool("key x");
         });
         assert_eq!(shown.dimensions(), (1280, 720));
@@ -200,7 +200,7 @@ fn a_trackers_gaze_reaches_the_next_batch_wherever_the_pointer_is() {
     let (shown, figures) = display.session(8, &["--gaze", &source], |display| {
         display.xdotool(&format!("mousemove {pointer_x} {y}"));
         std::thread::sleep(Duration::from_millis(1500));
-        display.xdotool("key r");
+        display.xdotool("key ctrl+r");
         display.xdotool("key x");
         display.xdotool("key g");
     });

@@ -49,7 +49,7 @@ pub const KEYS: [(&str, &str); 38] = [
     ("Alt H", "show all that is hidden"),
     ("M", "next mode"),
     ("Space", "pause"),
-    ("R", "restart"),
+    ("Ctrl R", "start the film again"),
     ("F", "ring at the fovea"),
     ("Shift F", "rings of eccentricity"),
     ("G", "gaze: sources, drift, recording"),
@@ -313,7 +313,7 @@ fn buttons(ui: &mut Ui, controls: &mut Controls, actions: &mut Vec<Action>) {
             controls.paused = !controls.paused;
         }
         for (name, hint, action) in [
-            ("Restart", "R", Action::Restart),
+            ("Restart", "Ctrl R: empties the film", Action::Restart),
             ("Save PNG", "Ctrl S: the picture as shown", Action::SavePng),
             ("Save EXR", "Ctrl Shift S: the whole film, linear", Action::SaveExr),
         ] {

@@ -53,7 +53,8 @@ impl Window {
         let png = saves(Modifiers::COMMAND, Key::S);
         let plain = |key| pressed(Modifiers::NONE, key);
         let camera = NUMBERS.iter().position(|key| plain(*key)).or_else(|| plain(Key::Home).then_some(self.camera));
-        let restart = plain(Key::R);
+        // A film is emptied without a question: not by a key that means something else in other programs.
+        let restart = saves(Modifiers::COMMAND, Key::R);
         if plain(Key::Space) {
             self.controls.paused = !self.controls.paused;
         }
