@@ -16,9 +16,11 @@ use tracer::scene::EnvironmentImage;
 
 use crate::cli::SceneArgs;
 use crate::session::{self, Loaded, Shapes, Source, one_line};
+use environment::EnvironmentFile;
 use rule::{Reading, Rule, Step, Timing};
 use stamps::{Stamps, folders};
 
+mod environment;
 pub mod rule;
 pub mod stamps;
 
@@ -42,7 +44,7 @@ pub enum LoadEvent {
     Broken(String),
     /// The scene that was to be followed again is: what comes from now on is of it.
     Followed,
-    /// An environment image that was asked for, or why it cannot be had.
+    /// An environment image that was asked for, or a newer version of it, or why it cannot be had.
     Environment(PathBuf, Result<Arc<EnvironmentImage>, String>),
 }
 
@@ -95,6 +97,9 @@ enum Note {
     /// The reading of this number has got so far.
     Shapes(u64, Source, Sketchable),
     Read(Box<Finished>),
+    Environment(PathBuf),
+    /// What came of this reading.
+    EnvironmentRead(u64, Result<Arc<EnvironmentImage>, String>),
     Close,
 }
 
@@ -110,8 +115,6 @@ struct Finished {
 pub struct Loader {
     notes: Sender<Note>,
     events: Receiver<LoadEvent>,
-    outbox: Sender<LoadEvent>,
-    wake: Wake,
     loading: Arc<Mutex<Option<Loading>>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -125,7 +128,6 @@ impl Loader {
         let (notes, inbox) = mpsc::channel();
         let (outbox, events) = mpsc::channel();
         let loading = Arc::new(Mutex::new(None));
-        let wake: Wake = Arc::new(wake);
         let stirred = Arc::new(AtomicBool::new(false));
         let watcher = notify::recommended_watcher({
             let (stirred, notes) = (Arc::clone(&stirred), notes.clone());
@@ -143,19 +145,21 @@ impl Loader {
             timing,
             notes: notes.clone(),
             inbox,
-            outbox: outbox.clone(),
+            outbox,
             stirred,
             loading: Arc::clone(&loading),
-            wake: Arc::clone(&wake),
+            wake: Arc::new(wake),
             // Without a watcher the files are looked at now and then, as on drives that report nothing.
             watcher: watcher.ok(),
             watched: Vec::new(),
             number: 0,
             reading: None,
             open: None,
+            environment: None,
+            environment_number: 0,
         };
         let thread = std::thread::Builder::new().name("loader".into()).spawn(move || worker.run())?;
-        Ok(Self { notes, events, outbox, wake, loading, thread: Some(thread) })
+        Ok(Self { notes, events, loading, thread: Some(thread) })
     }
 
     /// Opens a scene; an earlier wish that is not fulfilled yet is given up.
@@ -168,28 +172,14 @@ impl Loader {
         self.send(Note::Follow(watched));
     }
 
-    /// Gives up what is being opened.
+    /// Gives up what is being read. A changed file that is given up is read when it changes again.
     pub fn cancel(&self) {
         self.send(Note::Cancel);
     }
 
-    /// Reads an environment image in the background.
+    /// Reads an environment image in the background, and again whenever its file changes, until another one is asked for.
     pub fn load_environment(&self, path: PathBuf) {
-        let (outbox, wake) = (self.outbox.clone(), Arc::clone(&self.wake));
-        let spawned = std::thread::Builder::new().name("read environment".into()).spawn({
-            let path = path.clone();
-            move || {
-                let result = tracer::environment::load(&path);
-                let result = result.map(|loaded| Arc::new(loaded.image)).map_err(|error| error.to_string());
-                // The handle is gone: nobody wants the image any more.
-                let _ = outbox.send(LoadEvent::Environment(path, result));
-                wake();
-            }
-        });
-        if let Err(error) = spawned {
-            // The receiver is this handle's own.
-            let _ = self.outbox.send(LoadEvent::Environment(path, Err(error.to_string())));
-        }
+        self.send(Note::Environment(path));
     }
 
     /// The next event, if there is one.
@@ -273,6 +263,9 @@ struct Worker {
     number: u64,
     reading: Option<ReadingOf>,
     open: Option<Open>,
+    environment: Option<EnvironmentFile>,
+    /// Counts its readings.
+    environment_number: u64,
 }
 
 impl Worker {
@@ -289,11 +282,17 @@ impl Worker {
                     }
                 }
                 Ok(Note::Read(finished)) => self.finish(*finished),
+                Ok(Note::Environment(path)) => {
+                    self.environment = Some(EnvironmentFile::new(path, self.timing));
+                    self.watch();
+                    self.read_environment();
+                }
+                Ok(Note::EnvironmentRead(number, result)) => self.finish_environment(number, result),
                 Ok(Note::Stirred) => self.stirred.store(false, Ordering::Release),
                 Err(RecvTimeoutError::Timeout) => {}
                 Ok(Note::Close) | Err(RecvTimeoutError::Disconnected) => return,
             }
-            pause = self.look();
+            pause = self.look().min(self.look_at_environment());
         }
     }
 
@@ -321,6 +320,45 @@ impl Worker {
                 self.read_again();
                 IDLE
             }
+        }
+    }
+
+    /// The same for the environment that edits name.
+    fn look_at_environment(&mut self) -> Duration {
+        match self.environment.as_mut().map_or(Step::Rest, |file| file.look(self.timing.poll)) {
+            Step::Rest => IDLE,
+            Step::Wait(left) => left,
+            Step::Read => {
+                self.read_environment();
+                IDLE
+            }
+        }
+    }
+
+    fn read_environment(&mut self) {
+        let Some(path) = self.environment.as_ref().map(|file| file.path.clone()) else { return };
+        self.environment_number += 1;
+        let (number, notes) = (self.environment_number, self.notes.clone());
+        let spawned = std::thread::Builder::new().name("read environment".into()).spawn(move || {
+            let result = tracer::environment::load(&path);
+            let result = result.map(|loaded| Arc::new(loaded.image)).map_err(|error| error.to_string());
+            // The loader is gone: nobody wants the image any more.
+            let _ = notes.send(Note::EnvironmentRead(number, result));
+        });
+        if let Err(error) = spawned {
+            self.finish_environment(number, Err(error.to_string()));
+        }
+    }
+
+    fn finish_environment(&mut self, number: u64, result: Result<Arc<EnvironmentImage>, String>) {
+        if number != self.environment_number {
+            return;
+        }
+        let Some(file) = &mut self.environment else { return };
+        // What was written to meanwhile is read once more.
+        if file.is_steady() {
+            let event = LoadEvent::Environment(file.path.clone(), result);
+            self.tell(event);
         }
     }
 
@@ -372,7 +410,11 @@ impl Worker {
     }
 
     fn cancel(&mut self) {
-        if matches!(self.reading, Some(ReadingOf::Wish)) {
+        if let (Some(ReadingOf::Again), Some(open)) = (&self.reading, &mut self.open) {
+            // As they are now the files are not wanted.
+            open.rule = Rule::after(open.stamps(), self.timing, Instant::now());
+        }
+        if self.reading.is_some() {
             self.give_up();
         }
     }
@@ -451,10 +493,11 @@ impl Worker {
         self.tell(LoadEvent::Changed(loaded));
     }
 
-    /// Watches the folders of the open scene's files: a file that is replaced by renaming is seen in its folder.
+    /// Watches the folders of the open scene's files and of its environment: a file that is replaced by renaming is seen in its folder.
     fn watch(&mut self) {
-        let Some(open) = &self.open else { return };
-        let wanted = folders(&open.watched.files);
+        let files = self.open.iter().flat_map(|open| &open.watched.files);
+        let files: Vec<PathBuf> = files.chain(self.environment.iter().map(|file| &file.path)).cloned().collect();
+        let wanted = folders(&files);
         let Some(watcher) = &mut self.watcher else { return };
         for folder in self.watched.iter().filter(|folder| !wanted.contains(folder)) {
             // A folder that is gone cannot be unwatched, and need not be.

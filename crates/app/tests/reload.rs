@@ -53,6 +53,11 @@ fn loaded(event: &LoadEvent) -> &Loaded {
 
 /// One triangle whose positions, roughness and name all tell the version: a mixture of two shows.
 fn glb(version: u16) -> Vec<u8> {
+    padded_glb(version, 640)
+}
+
+/// The same, with so many bytes of JSON at least.
+fn padded_glb(version: u16, length: usize) -> Vec<u8> {
     // Below 1, so that the scene is not moved to its centre.
     let v = f32::from(version) / 2000.0;
     let bin: Vec<u8> =
@@ -67,7 +72,7 @@ fn glb(version: u16) -> Vec<u8> {
         v
     )
     .into_bytes();
-    json.resize(json.len().next_multiple_of(4).max(640), b' ');
+    json.resize(json.len().next_multiple_of(4).max(length), b' ');
     let mut bytes = b"glTF".to_vec();
     let chunks = [(json.as_slice(), b"JSON"), (bin.as_slice(), b"BIN\0")];
     let total = 12 + chunks.iter().map(|(data, _)| 8 + data.len()).sum::<usize>();
@@ -357,5 +362,75 @@ fn images_wait_for_the_sketch_of_their_scene_but_not_for_ever() {
     let newer = open(&other);
     drop((held, newer));
     assert_eq!(version(loaded(&opened())), 8);
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn a_changed_file_that_is_given_up_is_read_when_it_changes_again() {
+    let folder = scratch("given-up");
+    let path = folder.join("scene.glb");
+    std::fs::write(&path, glb(1)).unwrap();
+    let loader = loader();
+    loader.open(Source::File(path.clone()));
+    wait(&loader, |_| {}, |event| matches!(event, LoadEvent::Opened(..)));
+    let start = Instant::now();
+    let is_patient = || assert!(start.elapsed() < Duration::from_secs(120), "nothing can be given up");
+    // A machine that is busy may read a file before it can be given up: then with the next one.
+    let given_up = (2..30).find(|version| {
+        std::thread::sleep(4 * QUIET);
+        while loader.poll().is_some() {}
+        std::fs::write(&path, padded_glb(*version, 16 << 20)).unwrap();
+        while loader.loading().is_none() {
+            is_patient();
+            std::thread::yield_now();
+        }
+        loader.cancel();
+        while loader.loading().is_some() {
+            is_patient();
+            std::thread::yield_now();
+        }
+        std::thread::sleep(8 * QUIET);
+        loader.poll().is_none() && loader.loading().is_none()
+    });
+    assert!(given_up.is_some(), "what was given up is read");
+    std::fs::write(&path, glb(40)).unwrap();
+    let event = wait(&loader, |_| {}, |event| matches!(event, LoadEvent::Changed(_)));
+    assert_eq!(version(loaded(&event)), 40);
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+/// A grey environment of one pixel.
+fn hdr(level: f32) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    image::codecs::hdr::HdrEncoder::new(&mut bytes).encode(&[image::Rgb([level; 3])], 1, 1).unwrap();
+    bytes
+}
+
+#[test]
+fn an_environment_is_read_again_when_its_file_changes_or_it_is_asked_for_again() {
+    let folder = scratch("environment");
+    let [sky, other] = ["sky.hdr", "other.hdr"].map(|name| folder.join(name));
+    let loader = loader();
+    let next = || match wait(&loader, |_| {}, |event| matches!(event, LoadEvent::Environment(..))) {
+        LoadEvent::Environment(path, result) => (path, result.map(|image| image.pixels[0][0])),
+        event => panic!("{event:?}"),
+    };
+    loader.load_environment(sky.clone());
+    assert!(matches!(next(), (path, Err(text)) if path == sky && text.contains("sky.hdr")));
+    for level in [1.0, 2.0] {
+        std::fs::write(&sky, hdr(level)).unwrap();
+        assert_eq!(next(), (sky.clone(), Ok(level)));
+    }
+    // Asked for again, as it is.
+    loader.load_environment(sky.clone());
+    assert_eq!(next(), (sky.clone(), Ok(2.0)));
+    // Of the one that was asked for before nothing is heard.
+    std::fs::write(&other, hdr(4.0)).unwrap();
+    loader.load_environment(other.clone());
+    assert_eq!(next(), (other.clone(), Ok(4.0)));
+    std::fs::write(&sky, hdr(8.0)).unwrap();
+    std::thread::sleep(4 * QUIET);
+    std::fs::write(&other, hdr(16.0)).unwrap();
+    assert_eq!(next(), (other, Ok(16.0)));
     std::fs::remove_dir_all(folder).unwrap();
 }
