@@ -34,15 +34,20 @@ pub fn read(path: &Path) -> Result<Value, String> {
     serde_json::from_str(&text).map_err(|error| format!("{}: {error}", path.display()))
 }
 
+/// Names for other versions of a file, in order: `NAME.word.json`, `NAME.word-2.json` and so on.
+pub fn names_beside(path: &Path, word: &str) -> impl Iterator<Item = PathBuf> {
+    let endings =
+        std::iter::once(format!("{word}.json")).chain((2_u32..).map(move |number| format!("{word}-{number}.json")));
+    endings.map(|ending| path.with_extension(ending))
+}
+
 /// Renames a file that makes no sense to this program, so that whoever wrote it still has it; its new name, which no other
 /// file had.
 ///
 /// # Errors
 /// When it cannot be renamed.
 pub fn put_aside(path: &Path) -> std::io::Result<PathBuf> {
-    let numbered = (2_u32..).map(|number| path.with_extension(format!("broken-{number}.json")));
-    let mut names = std::iter::once(path.with_extension("broken.json")).chain(numbered);
-    let aside = names.find(|name| !name.exists()).ok_or(std::io::ErrorKind::AlreadyExists)?;
+    let aside = names_beside(path, "broken").find(|name| !name.exists()).ok_or(std::io::ErrorKind::AlreadyExists)?;
     std::fs::rename(path, &aside).map(|()| aside)
 }
 

@@ -4,7 +4,6 @@
 //! ones back. When the file changes on disk, the edits are put onto the new version wherever a part of the same name is
 //! still there; those of other parts wait until theirs are back.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -13,7 +12,6 @@ use tracer::import::SceneNode;
 use tracer::scene::{EnvironmentImage, Scene};
 
 use crate::session::Loaded;
-use apply::Environments;
 use edits::{Edit, Edits, Part, Target};
 use tree::{PartName, Tree};
 
@@ -34,15 +32,6 @@ pub enum Gesture {
     Once,
     /// Goes on: further edits of the same target are the same step, until [`Document::end_gesture`].
     GoesOn,
-}
-
-#[derive(Clone, Debug, Default)]
-struct Images(BTreeMap<PathBuf, Arc<EnvironmentImage>>);
-
-impl Environments for Images {
-    fn get(&self, path: &Path) -> Option<Arc<EnvironmentImage>> {
-        self.0.get(path).cloned()
-    }
 }
 
 /// The names of a file's parts.
@@ -77,7 +66,8 @@ pub struct Document {
     gesture: Option<Target>,
     saved: Edits,
     solo: Option<u32>,
-    environments: Images,
+    /// The image that the edits name, once it is read; an image takes up to 1.5 GiB, so no other is kept.
+    environment: Option<(PathBuf, Arc<EnvironmentImage>)>,
     version: Arc<Scene>,
 }
 
@@ -99,7 +89,7 @@ impl Document {
             gesture: None,
             saved: Edits::default(),
             solo: None,
-            environments: Images::default(),
+            environment: None,
         }
     }
 
@@ -245,16 +235,17 @@ impl Document {
         self.saved.clone_from(&self.edits);
     }
 
-    /// Knows an environment's image from now on.
+    /// Takes an environment's image, or a newer version of it. One that the edits do not name is not kept.
     pub fn add_environment(&mut self, path: PathBuf, image: Arc<EnvironmentImage>) {
-        self.environments.0.insert(path, image);
+        self.environment = Some((path, image));
         self.remake();
     }
 
-    /// The environment image that the edits name and that is not known yet.
+    /// The environment image that the edits name and that is not there: it was not read yet, or is read again, as one that is
+    /// named again by undo.
     pub fn wanted_environment(&self) -> Option<&Path> {
         let path = self.edits.environment.image.as_deref()?;
-        self.environments.get(path).is_none().then_some(path)
+        self.environment.is_none().then_some(path)
     }
 
     /// Goes on from a newer version of the file. What is selected is named by its new index, if it is still there; edits
@@ -278,11 +269,14 @@ impl Document {
     }
 
     fn remake(&mut self) {
+        let named = self.edits.environment.image.as_ref();
+        self.environment.take_if(|(path, _)| Some(&*path) != named);
         let unchanged = self.edits.is_empty() && self.solo.is_none();
         self.version = if unchanged {
             Arc::clone(&self.file)
         } else {
-            let made = apply::apply(&self.file, &self.nodes, &self.tree, &self.edits, self.solo, &self.environments);
+            let image = self.environment.as_ref().map(|(_, image)| image);
+            let made = apply::apply(&self.file, &self.nodes, &self.tree, &self.edits, self.solo, image);
             Arc::new(made.sharing_parts_of(&self.version))
         };
     }

@@ -85,8 +85,8 @@ pub fn run(args: &PreviewArgs) -> anyhow::Result<()> {
         }
         let gaze = GazeControl::new(Arc::clone(&gaze), args);
         let mut window = Window::new(engine, loader, adapter, args, gaze, (store, trouble), screenshot);
-        if let Some(file) = resumed {
-            window.resume(file.film);
+        if let Some((path, file)) = args.resume.as_deref().zip(resumed) {
+            window.resume(path, Box::new(file));
         }
         Ok(window)
     };
@@ -94,7 +94,7 @@ pub fn run(args: &PreviewArgs) -> anyhow::Result<()> {
     let (window, mut first) = (Rc::new(RefCell::new(None)), Some(first));
     let mut losses = Losses::default();
     let mut lose_at = args.lose_device_after.map(|secs| Instant::now() + Duration::from_secs_f64(secs));
-    loop {
+    let mut show = || loop {
         let (shown, first) = (Rc::clone(&window), first.take());
         let theme = window.borrow().as_ref().map_or(kept_theme, Window::theme);
         let place = window.borrow().as_ref().map_or(kept_place, Window::place);
@@ -127,11 +127,16 @@ pub fn run(args: &PreviewArgs) -> anyhow::Result<()> {
             Err(_) => true,
         };
         if !lost {
-            break;
+            return Ok(());
         }
         losses.count(Instant::now())?;
         lose_at = None;
+    };
+    let ended = catch_unwind(AssertUnwindSafe(|| -> anyhow::Result<()> { show() }));
+    if !matches!(ended, Ok(Ok(()))) {
+        rescue_edits(&window);
     }
+    ended.unwrap_or_else(|panic| resume_unwind(panic))?;
     if let Some(window) = &mut *window.borrow_mut() {
         window.close()?;
     }
@@ -139,6 +144,15 @@ pub fn run(args: &PreviewArgs) -> anyhow::Result<()> {
     match outcome {
         Some(figures) => print_json(&figures?),
         None => Ok(()),
+    }
+}
+
+/// Keeps what has not been saved of a window that ends without having asked.
+fn rescue_edits(window: &RefCell<Option<Window>>) {
+    match window.borrow().as_ref().and_then(Window::rescue_edits) {
+        Some(Ok(path)) => eprintln!("note: edits that were not saved are in {}", path.display()),
+        Some(Err(error)) => eprintln!("note: edits that were not saved are lost: {error}"),
+        None => {}
     }
 }
 

@@ -1,6 +1,5 @@
 //! From the file's version of a scene and the edits to the version that is shown.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use glam::{Affine3A, Mat3A, Quat, Vec3};
@@ -81,20 +80,14 @@ pub fn is_usually_visible(node: u32, tree: &Tree, edits: &Edits) -> bool {
     tree.is_shown_in_file(node) || tree.line(node).skip(1).any(shows)
 }
 
-/// Images of environments that have been loaded, by file.
-pub trait Environments {
-    /// The image of a file, once it is loaded.
-    fn get(&self, path: &Path) -> Option<Arc<EnvironmentImage>>;
-}
-
-/// The version of the scene that the edits make of the file's.
+/// The version of the scene that the edits make of the file's; `image` is the environment that they name, once it is read.
 pub fn apply(
     file: &Scene,
     nodes: &[SceneNode],
     tree: &Tree,
     edits: &Edits,
     solo: Option<u32>,
-    environments: &impl Environments,
+    image: Option<&Arc<EnvironmentImage>>,
 ) -> Scene {
     let mut scene = file.clone();
     if !edits.nodes.is_empty() || solo.is_some() {
@@ -120,7 +113,7 @@ pub fn apply(
             apply_light(light, edit);
         }
     }
-    apply_environment(&mut scene.environment, &edits.environment, environments);
+    apply_environment(&mut scene.environment, &edits.environment, image);
     scene.backdrop = edits.environment.backdrop.unwrap_or(scene.backdrop);
     scene
 }
@@ -145,9 +138,9 @@ fn apply_light(light: &mut PunctualLight, edit: &LightEdit) {
     }
 }
 
-fn apply_environment(environment: &mut Environment, edit: &EnvironmentEdit, environments: &impl Environments) {
-    if let Some(image) = edit.image.as_deref().and_then(|path| environments.get(path)) {
-        *environment = Environment::Image { image, rotation_deg: 0.0, intensity: 1.0 };
+fn apply_environment(environment: &mut Environment, edit: &EnvironmentEdit, image: Option<&Arc<EnvironmentImage>>) {
+    if let Some(image) = image {
+        *environment = Environment::Image { image: Arc::clone(image), rotation_deg: 0.0, intensity: 1.0 };
     }
     match environment {
         Environment::Constant(radiance) => {

@@ -2,7 +2,8 @@
 //!
 //! A sidecar, not a new glTF: a written glTF would lose what this program does not read (extensions, animation, custom
 //! properties), and the next export of the scene's own program would overwrite it. The sidecar outlives both, since parts
-//! are found by name. Lengths are metres, angles degrees, colours linear Rec. 709.
+//! are found by name. An environment image in the sidecar's folder or below is named from there, so that the folder can be moved;
+//! any other from the root. Lengths are metres, angles degrees, colours linear Rec. 709.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -16,6 +17,7 @@ use super::edits::{Edits, EnvironmentEdit, LightEdit, Move, NodeEdit};
 use super::parameters::{MaterialParameter, Value};
 use super::tree::PartName;
 use super::{Document, Names};
+use crate::config;
 use crate::output::{OutputError, write_atomically};
 
 /// What the file says it is.
@@ -35,6 +37,22 @@ pub fn path_for(scene: &Path) -> PathBuf {
     PathBuf::from(name)
 }
 
+/// What edits that could not be saved in time are called in their file's name.
+const RECOVERED: &str = "recovered";
+
+/// A file for edits of a window that ends, beside the one that they are saved to: `SCENE.fovea.recovered.json`, or the next that is
+/// free.
+pub fn free_rescue(sidecar: &Path) -> Option<PathBuf> {
+    config::names_beside(sidecar, RECOVERED).find(|path| !path.exists())
+}
+
+/// The last of those files, while nothing has been saved since.
+pub fn recovered(sidecar: &Path) -> Option<PathBuf> {
+    let last = config::names_beside(sidecar, RECOVERED).take_while(|path| path.exists()).last()?;
+    let written = |path: &Path| path.metadata().and_then(|metadata| metadata.modified()).ok();
+    (written(sidecar) < written(&last)).then_some(last)
+}
+
 impl Document {
     /// Saves the edits; without any, a file of earlier ones is overwritten by an empty list.
     ///
@@ -51,12 +69,12 @@ impl Document {
     /// # Errors
     /// When the file cannot be written.
     pub fn copy_edits(&self, path: &Path) -> Result<(), OutputError> {
-        let text = serde_json::to_string_pretty(&self.to_json()).expect("keys are strings");
+        let text = serde_json::to_string_pretty(&self.to_json(path)).expect("keys are strings");
         write_atomically(path, |writer| writeln!(writer, "{text}").map_err(|error| error.to_string()))
     }
 
-    /// The edits as one JSON object.
-    pub fn to_json(&self) -> Json {
+    /// The edits as one JSON object, as a file of this path holds them.
+    pub fn to_json(&self, path: &Path) -> Json {
         let edits = self.edits();
         json!({
             "format": FORMAT,
@@ -64,7 +82,7 @@ impl Document {
             "nodes": list_json(&edits.nodes, &self.names.nodes, &edits.absent.nodes, node_json),
             "materials": list_json(&edits.materials, &self.names.materials, &edits.absent.materials, material_json),
             "lights": list_json(&edits.lights, &self.names.lights, &edits.absent.lights, light_json),
-            "environment": environment_json(&edits.environment),
+            "environment": environment_json(&edits.environment, &folder_of(path)),
         })
     }
 
@@ -92,7 +110,7 @@ impl Document {
 
     fn read_edits(&self, path: &Path) -> Result<Edits, String> {
         let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
-        parse(&text, &self.names).map_err(|reason| format!("{}: {reason}", path.display()))
+        parse(&text, &self.names, &folder_of(path)).map_err(|reason| format!("{}: {reason}", path.display()))
     }
 }
 
@@ -157,10 +175,27 @@ fn light_json(edit: &LightEdit) -> Map<String, Json> {
     object
 }
 
-fn environment_json(edit: &EnvironmentEdit) -> Json {
+/// The folder of a file, from the root.
+fn folder_of(path: &Path) -> PathBuf {
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    absolute.parent().map(Path::to_owned).unwrap_or_default()
+}
+
+/// A file as it is named in a file of this folder: with `/` everywhere where it lies there or below.
+fn name_from(folder: &Path, file: &Path) -> String {
+    // The same folder may be named in several ways; a file that is a link stays where the link is.
+    let place = |folder: &Path| folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    let below = place(&folder_of(file)).strip_prefix(place(folder)).ok().map(Path::to_owned);
+    let Some((below, name)) = below.zip(file.file_name()) else { return file.to_string_lossy().into_owned() };
+    let below = below.join(name);
+    let parts: Vec<_> = below.iter().map(|part| part.to_string_lossy()).collect();
+    parts.join("/")
+}
+
+fn environment_json(edit: &EnvironmentEdit, folder: &Path) -> Json {
     let mut object = Map::new();
     if let Some(image) = &edit.image {
-        object.insert("image".into(), json!(image.to_string_lossy()));
+        object.insert("image".into(), json!(name_from(folder, image)));
     }
     if let Some(radiance) = edit.radiance {
         object.insert("radiance".into(), json!(radiance.to_array()));
@@ -179,8 +214,14 @@ fn environment_json(edit: &EnvironmentEdit) -> Json {
     Json::Object(object)
 }
 
-/// Edits for the parts of these names.
-fn parse(text: &str, names: &Names) -> Result<Edits, String> {
+/// Whether a file holds edits, whatever it is called.
+pub fn is_edits(path: &Path) -> bool {
+    let json = std::fs::read(path).ok().and_then(|bytes| serde_json::from_slice::<Json>(&bytes).ok());
+    json.is_some_and(|json| json["format"] == FORMAT)
+}
+
+/// Edits for the parts of these names, from a file of this folder.
+fn parse(text: &str, names: &Names, folder: &Path) -> Result<Edits, String> {
     let json: Json = serde_json::from_str(text).map_err(|error| format!("no file of edits: {error}"))?;
     if json["format"] != FORMAT {
         return Err(format!("no file of edits: its format is not \"{FORMAT}\""));
@@ -194,7 +235,7 @@ fn parse(text: &str, names: &Names) -> Result<Edits, String> {
     (edits.lights, edits.absent.lights) = list(&json["lights"], &names.lights, light_edit);
     let environment = &json["environment"];
     edits.environment = EnvironmentEdit {
-        image: environment["image"].as_str().map(PathBuf::from),
+        image: environment["image"].as_str().map(|name| folder.join(name)),
         radiance: vector(&environment["radiance"]),
         rotation_deg: number(&environment["rotation_deg"]),
         intensity: number(&environment["intensity"]),

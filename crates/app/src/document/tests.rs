@@ -280,7 +280,7 @@ fn saved_edits_are_read_back_the_same() {
         scale: Vec3::new(1.5, 1.0, 0.25),
     };
     let environment = EnvironmentEdit {
-        image: Some("sky of mine.hdr".into()),
+        image: Some(std::env::temp_dir().join("sky of mine.hdr")),
         rotation_deg: Some(33.0),
         intensity: Some(2.0),
         radiance: None,
@@ -308,6 +308,39 @@ fn saved_edits_are_read_back_the_same() {
     other.load_edits(&path).unwrap();
     assert_eq!(other.edits(), document.edits());
     std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn a_folder_with_edits_and_their_environment_can_be_moved() {
+    let loaded = built_in();
+    let here = std::env::temp_dir().join(format!("fovea-moved-{}", std::process::id()));
+    let there = here.with_extension("there");
+    for folder in [&here, &there] {
+        let _ = std::fs::remove_dir_all(folder);
+    }
+    std::fs::create_dir_all(here.join("skies")).unwrap();
+    let with = |image: PathBuf| {
+        let mut document = Document::new(&loaded);
+        document.edit(
+            &Edit::Environment(EnvironmentEdit { image: Some(image), ..EnvironmentEdit::default() }),
+            Gesture::Once,
+        );
+        document
+    };
+    let named = |folder: &Path, name: &str| {
+        let mut document = Document::new(&loaded);
+        document.load_edits(&folder.join(name)).unwrap();
+        document.edits().environment.image.clone().unwrap()
+    };
+    let elsewhere = std::env::temp_dir().join("sky.hdr");
+    with(here.join("skies/noon.hdr")).save_edits(&here.join("below.json")).unwrap();
+    with(here.join("skies/../dusk.hdr")).save_edits(&here.join("beside.json")).unwrap();
+    with(elsewhere.clone()).save_edits(&here.join("elsewhere.json")).unwrap();
+    std::fs::rename(&here, &there).unwrap();
+    assert_eq!(named(&there, "below.json"), there.join("skies/noon.hdr"));
+    assert_eq!(named(&there, "beside.json"), there.join("dusk.hdr"));
+    assert_eq!(named(&there, "elsewhere.json"), elsewhere);
+    std::fs::remove_dir_all(there).unwrap();
 }
 
 #[test]

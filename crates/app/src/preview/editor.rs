@@ -15,6 +15,7 @@ use super::theme;
 use crate::config;
 use crate::document::edits::{Edit, EnvironmentEdit, Part};
 use crate::document::{Document, Gesture, sidecar};
+use crate::output::OutputError;
 use crate::pick::Picker;
 use crate::session::{Loaded, Source};
 use gizmo::{Drag, Gizmo, axes_of};
@@ -63,8 +64,17 @@ pub struct Editor {
     /// The file there could not be read: it is put aside before another is written.
     is_unreadable: bool,
     message: Option<Message>,
-    /// The environment image that was last asked for.
+    /// The environment image that was last asked for, and what became of it.
     asked_environment: Option<PathBuf>,
+    reading: Reading,
+}
+
+/// What became of an image that was asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Reading {
+    UnderWay,
+    Done,
+    Failed,
 }
 
 impl Editor {
@@ -75,6 +85,12 @@ impl Editor {
             let taken = editor.document.load_edits(&editor.sidecar);
             editor.is_unreadable = taken.is_err();
             editor.message = Some(message_of(&editor.sidecar, taken));
+        }
+        if let Some(recovered) = sidecar::recovered(&editor.sidecar) {
+            let name = recovered.display();
+            let text =
+                format!("{name} has edits that were not saved when the window ended; File, Open edits takes them");
+            editor.message = Some(Message::now(text, true));
         }
         editor
     }
@@ -95,6 +111,7 @@ impl Editor {
             source: source.clone(),
             sidecar,
             asked_environment: None,
+            reading: Reading::Done,
             is_unreadable: false,
         }
     }
@@ -118,6 +135,12 @@ impl Editor {
     pub fn open_edits(&mut self, path: &Path) {
         let taken = self.document.open_edits(path);
         self.message = Some(message_of(path, taken));
+    }
+
+    /// Keeps edits that are not saved, in a file that none had, where the window ends without a question; that file.
+    pub fn rescue(&self) -> Option<Result<PathBuf, OutputError>> {
+        let path = sidecar::free_rescue(&self.sidecar).filter(|_| self.document.is_unsaved())?;
+        Some(self.document.copy_edits(&path).map(|()| path))
     }
 
     /// Goes on from a newer version of the file.
@@ -296,25 +319,39 @@ impl Editor {
         self.document.edit(&Edit::Environment(edit), gesture);
     }
 
-    /// Lights the scene with an image; what else is known of the environment stays. An image that could not be read is tried again.
+    /// Lights the scene with an image; what else is known of the environment stays. Its file is read, also where it was before.
     pub fn set_environment(&mut self, path: PathBuf) {
         self.asked_environment = None;
         let edit = EnvironmentEdit { image: Some(path), ..self.document.edits().environment.clone() };
         self.edit_environment(edit, Gesture::Once);
     }
 
-    /// The environment image that the document lacks, once: a file that cannot be read is not tried at every frame.
+    /// The environment image that is to be read, once: whoever reads it watches its file, and one that cannot be read is not tried
+    /// at every frame.
     pub fn ask_for_environment(&mut self) -> Option<PathBuf> {
-        let wanted = self.document.wanted_environment();
-        if wanted == self.asked_environment.as_deref() {
+        let named = &self.document.edits().environment.image;
+        // Undo may name another one in between, and the image is gone.
+        let is_gone = self.reading == Reading::Done && self.document.wanted_environment().is_some();
+        if *named == self.asked_environment && !is_gone {
             return None;
         }
-        self.asked_environment = wanted.map(Path::to_owned);
+        self.asked_environment.clone_from(named);
+        self.reading = Reading::UnderWay;
         self.asked_environment.clone()
     }
 
-    /// Takes an environment image, or the reason why there is none.
+    /// Whether the scene is without the environment image that its edits name, which is still to come.
+    pub fn awaits_environment(&self) -> bool {
+        let wanted = self.document.wanted_environment();
+        wanted.is_some() && (wanted != self.asked_environment.as_deref() || self.reading == Reading::UnderWay)
+    }
+
+    /// Takes an environment image, or the reason why there is none. What was asked for before the last one is nobody's business.
     pub fn take_environment(&mut self, path: PathBuf, result: Result<Arc<EnvironmentImage>, String>) {
+        if self.asked_environment.as_ref() != Some(&path) {
+            return;
+        }
+        self.reading = if result.is_ok() { Reading::Done } else { Reading::Failed };
         match result {
             Ok(image) => self.document.add_environment(path, image),
             Err(reason) => self.message = Some(Message::now(reason, true)),
@@ -393,7 +430,7 @@ impl Editor {
         serde_json::json!({
             "selected": self.selected_name(),
             "pivot_m": pivot.to_array(),
-            "edits": self.document.to_json(),
+            "edits": self.document.to_json(&self.sidecar),
             "unsaved": self.document.is_unsaved(),
             "can_undo": self.document.can_undo(),
             "message": self.message.as_ref().map(|message| message.text.as_str()),
@@ -414,91 +451,4 @@ fn message_of(path: &Path, absent: Result<Vec<String>, String>) -> Message {
 }
 
 #[cfg(test)]
-#[expect(clippy::unwrap_used, reason = "a test may panic")]
-mod tests {
-    use super::*;
-
-    /// The built-in scene as a file of a new folder.
-    fn room(name: &str) -> (PathBuf, Source, Loaded) {
-        let folder = std::env::temp_dir().join(format!("fovea-editor-{name}-{}", std::process::id()));
-        let _ = std::fs::remove_dir_all(&folder);
-        std::fs::create_dir_all(&folder).unwrap();
-        let args = crate::cli::parse(["fovea".into()]).unwrap().preview;
-        let source = Source::File(folder.join("room.glb"));
-        (folder, source, crate::session::load(&Source::BuiltIn, &args.scene).unwrap())
-    }
-
-    #[test]
-    fn a_file_of_edits_that_cannot_be_read_is_put_aside_before_another_is_written() {
-        let (folder, source, loaded) = room("unreadable");
-        let sidecar = folder.join("room.glb.fovea.json");
-        let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
-        for (text, aside) in [("{ \"format\"", "room.glb.fovea.broken.json"), ("[]", "room.glb.fovea.broken-2.json")] {
-            std::fs::write(&sidecar, text).unwrap();
-            let mut editor = Editor::open(&source, &loaded);
-            editor.act(Action::Save);
-            assert_eq!(read("room.glb.fovea.json"), text, "there is nothing to save");
-            for (node, message) in [(0, aside), (1, "saved")] {
-                let hide = Edit::Hide(editor.document.tree().roots[node], true);
-                editor.act(Action::Edit(hide, Gesture::Once));
-                editor.act(Action::Save);
-                assert!(editor.message().unwrap().text.contains(message), "{:?}", editor.message());
-                assert_eq!(read(aside), text, "the edits of another file stay where they are");
-            }
-            assert_eq!(Editor::open(&source, &loaded).document.edits(), editor.document.edits());
-        }
-        std::fs::remove_dir_all(folder).unwrap();
-    }
-
-    #[test]
-    fn edits_of_another_file_are_opened_in_one_step() {
-        let (folder, source, loaded) = room("opened");
-        let mut editor = Editor::open(&source, &loaded);
-        let roots = editor.document.tree().roots.clone();
-        let hide = |editor: &mut Editor, place: usize| {
-            editor.act(Action::Edit(Edit::Hide(roots[place], true), Gesture::Once));
-        };
-        (0..2).for_each(|place| hide(&mut editor, place));
-        let copy = folder.join("other.fovea.json");
-        assert!(editor.save_as(&copy) && editor.document.is_unsaved(), "a copy is not read again");
-        let copied = editor.document.edits().clone();
-        let mut editor = Editor::open(&source, &loaded);
-        hide(&mut editor, 2);
-        let before = editor.document.edits().clone();
-        editor.open_edits(&copy);
-        assert_eq!((editor.document.edits(), editor.document.is_unsaved()), (&copied, true));
-        editor.act(Action::Undo);
-        assert_eq!(editor.document.edits(), &before);
-        editor.act(Action::Redo);
-        assert_eq!(editor.document.edits(), &copied);
-        std::fs::write(&copy, "{").unwrap();
-        editor.open_edits(&copy);
-        assert!(editor.message().unwrap().wrong);
-        assert_eq!(editor.document.edits(), &copied, "what is no file of edits changes nothing");
-        std::fs::remove_dir_all(folder).unwrap();
-    }
-
-    #[test]
-    fn an_environment_that_failed_is_tried_again_when_it_is_named_again() {
-        let loaded =
-            crate::session::load(&Source::BuiltIn, &crate::cli::parse(["fovea".into()]).unwrap().preview.scene)
-                .unwrap();
-        let mut editor = Editor::open(&Source::BuiltIn, &loaded);
-        let path = std::path::absolute("sky.hdr").unwrap();
-        let fails = |editor: &mut Editor| editor.take_environment(path.clone(), Err("no such file".into()));
-        assert_eq!(editor.ask_for_environment(), None);
-        for name in [Action::LoadEnvironment("sky.hdr".into()), Action::LoadEnvironment(path.clone())] {
-            editor.act(name);
-            assert_eq!(editor.ask_for_environment().as_ref(), Some(&path));
-            fails(&mut editor);
-            assert_eq!(editor.ask_for_environment(), None, "not at every frame");
-        }
-        // Another property of the environment is none of the image's.
-        let dimmed = EnvironmentEdit { intensity: Some(0.5), ..editor.document.edits().environment.clone() };
-        editor.act(Action::Edit(Edit::Environment(dimmed), Gesture::GoesOn));
-        assert_eq!(editor.ask_for_environment(), None);
-        // A drop and the dialog.
-        editor.set_environment("sky.hdr".into());
-        assert_eq!(editor.ask_for_environment(), Some(path));
-    }
-}
+mod tests;

@@ -1,12 +1,11 @@
 //! The window: the picture, what lies over it, and what mouse and keys do.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
 use egui::{Context, Rect, Sense, Ui};
 use glam::{UVec2, Vec2, Vec3};
-use tracer::film::FilmSnapshot;
 use tracer::scene::Scene;
 
 use super::attention_tools::{self, ToolState};
@@ -30,6 +29,8 @@ use super::unsaved::Unsaved;
 use super::versions::Versions;
 use crate::cli::PreviewArgs;
 use crate::cli::choices::Mode;
+use crate::output::OutputError;
+use crate::output::exr::FilmFile;
 use crate::preferences::Store;
 use crate::reload::{Loader, Watched};
 use crate::session::Source;
@@ -78,7 +79,7 @@ pub struct Window {
     camera: usize,
     screenshot: Option<Screenshot>,
     /// A film to go on with once its scene is open.
-    resumed: Option<Arc<FilmSnapshot>>,
+    film: Option<files::GoingOn>,
     /// Presses of the headset's mode button that have been followed.
     mode_presses: u64,
     files: files::Files,
@@ -120,16 +121,21 @@ impl Window {
             given: None,
             camera: 0,
             screenshot,
-            resumed: None,
+            film: None,
             mode_presses: 0,
             files: files::Files::new(store, trouble),
             versions: Versions::default(),
         }
     }
 
-    /// Goes on with a film as soon as its scene is open, from where it was taken.
-    pub fn resume(&mut self, film: FilmSnapshot) {
-        self.resumed = Some(Arc::new(film));
+    /// Goes on with the film of a file as soon as its scene is open, from where it was taken.
+    pub fn resume(&mut self, path: &Path, file: Box<FilmFile>) {
+        self.film = Some(files::GoingOn::new(path, file));
+    }
+
+    /// Keeps edits that are not saved when the window ends without a question; the file.
+    pub fn rescue_edits(&self) -> Option<Result<PathBuf, OutputError>> {
+        self.editor.as_ref().and_then(Editor::rescue)
     }
 
     /// Whether the window's device is gone.
@@ -156,13 +162,17 @@ impl Window {
     /// Gives the engine the document's version and asks the loader for what that lacks.
     fn hand_over(&mut self) {
         let Some(editor) = &mut self.editor else { return };
+        if let Some(path) = editor.ask_for_environment() {
+            self.loader.load_environment(path);
+        }
+        // A first version is not prepared for another film than the one to go on with.
+        if self.given.is_none() && self.film.is_some() {
+            return;
+        }
         let version = editor.document().version();
         if !self.given.as_ref().is_some_and(|given| Arc::ptr_eq(given, version)) {
             self.given = Some(Arc::clone(version));
             self.engine.set_scene(Arc::clone(version));
-        }
-        if let Some(path) = editor.ask_for_environment() {
-            self.loader.load_environment(path);
         }
     }
 
@@ -258,6 +268,8 @@ impl Window {
                     self.loader.cancel();
                     self.unsaved.keep();
                     self.give_up_sketch();
+                    self.files.forget_waiting(self.editor.is_some());
+                    self.note = Some(Message::now(format!("{} is not read", loading.name), false));
                 }
                 ctx.request_repaint_after(WORTH_SAYING);
                 return;
@@ -416,7 +428,6 @@ impl eframe::App for Window {
                 editor.draw(ui, rect, &look.standpoint);
             }
             self.engine.look(look);
-            self.go_on_with_film();
         }
         gaze_panel::dots(ui, rect, &self.gaze, now);
         if self.gaze.wants_frames() {
@@ -428,6 +439,7 @@ impl eframe::App for Window {
         self.ask(&ctx, rect);
         self.unsaved.follow_title(&ctx, self.editor.as_ref());
         self.hand_over();
+        self.go_on_with_film(&ctx);
         self.gaze.remember_screen(&self.controls, now);
         self.follow_files(&ctx, frame);
         if self.versions.frame(SystemTime::now(), state.version) {
@@ -452,3 +464,6 @@ impl eframe::App for Window {
         [0.04, 0.04, 0.045, 1.0]
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use egui::{Context, ThemePreference};
-use tracer::film::FilmSnapshot;
+use tracer::film::FilmHeader;
 use tracer::scene::Scene;
 
 use super::Window;
@@ -32,6 +32,25 @@ enum FilmRead {
     Image(PathBuf),
 }
 
+/// A film to go on with.
+pub(super) struct GoingOn {
+    /// What its file is called.
+    name: String,
+    file: Box<FilmFile>,
+    /// The view was brought to where it was taken.
+    is_seen: bool,
+}
+
+impl GoingOn {
+    pub(super) fn new(path: &Path, file: Box<FilmFile>) -> Self {
+        Self { name: name_of(path), file, is_seen: false }
+    }
+
+    pub(super) fn header(&self) -> &FilmHeader {
+        &self.file.film.header
+    }
+}
+
 /// The window's files and settings.
 pub(super) struct Files {
     store: Store,
@@ -42,8 +61,10 @@ pub(super) struct Files {
     dialogs: Dialogs,
     asked: Option<Purpose>,
     films: Background<FilmRead>,
-    /// To go on with as soon as the window stands where it was taken.
-    film: Option<Arc<FilmSnapshot>>,
+    /// For the scene that is on its way.
+    waiting: Vec<(Purpose, PathBuf)>,
+    /// For the one that was opened just now.
+    due: Vec<(Purpose, PathBuf)>,
     folder: Option<PathBuf>,
     theme: ThemePreference,
     place: Option<WindowPlace>,
@@ -63,12 +84,30 @@ impl Files {
             dialogs: Dialogs::default(),
             asked: None,
             films: Background::default(),
-            film: None,
+            waiting: Vec::new(),
+            due: Vec::new(),
             folder: kept.folder.clone(),
             theme: kept.theme,
             place: kept.window,
             is_placed: false,
             store,
+        }
+    }
+
+    /// Takes a file when the scene that is on its way is open.
+    fn wait(&mut self, purpose: Purpose, path: PathBuf) {
+        self.waiting.push((purpose, path));
+    }
+
+    /// What waits has its scene.
+    pub(super) fn scene_is_open(&mut self) {
+        self.due.append(&mut self.waiting);
+    }
+
+    /// The scene on its way does not come, or is another. Where there is none at all, what waits goes with the first that comes.
+    pub(super) fn forget_waiting(&mut self, is_open: bool) {
+        if is_open {
+            self.waiting.clear();
         }
     }
 }
@@ -122,7 +161,10 @@ impl Window {
     }
 
     fn take_files(&mut self, ctx: &Context, frame: &eframe::Frame) {
-        self.open_dropped_file(ctx);
+        self.take_dropped_files(ctx);
+        for (purpose, path) in std::mem::take(&mut self.files.due) {
+            self.take_file(ctx, purpose, path);
+        }
         if let Some(purpose) = self.files.asked.take() {
             let scene = self.scene.as_ref().map_or("picture", |(scene, _)| scene.name.as_str());
             let sidecar = self.editor.as_ref().map(Editor::sidecar);
@@ -144,10 +186,22 @@ impl Window {
         }
     }
 
-    fn open_dropped_file(&mut self, ctx: &Context) {
-        let dropped = ctx.input(|input| input.raw.dropped_files.first().map(|file| file.path().to_owned()));
-        if let Some(path) = dropped {
-            self.take_file(ctx, purpose_of(&path), path);
+    /// Takes what was dropped: a scene first, and what is for it with that.
+    fn take_dropped_files(&mut self, ctx: &Context) {
+        let dropped: Vec<PathBuf> =
+            ctx.input(|input| input.raw.dropped_files.iter().map(|file| file.path().to_owned()).collect());
+        let (taken, left) = one_of_each(dropped);
+        let brings_scene = taken.first().is_some_and(|(purpose, _)| *purpose == Purpose::Scene);
+        for (purpose, path) in taken {
+            if purpose != Purpose::Scene && brings_scene {
+                self.files.wait(purpose, path);
+            } else {
+                self.take_file(ctx, purpose, path);
+            }
+        }
+        if !left.is_empty() {
+            let text = format!("only one file of a kind is taken at a time; left: {}", left.join(", "));
+            self.note = Some(Message::now(text, true));
         }
     }
 
@@ -156,11 +210,10 @@ impl Window {
         self.files.folder = path.parent().filter(|folder| folder.is_absolute()).map(Path::to_owned);
         match purpose {
             Purpose::Scene => self.open_scene(Source::File(path)),
-            Purpose::Environment => {
-                if let Some(editor) = &mut self.editor {
-                    editor.set_environment(path);
-                }
-            }
+            Purpose::Environment => match &mut self.editor {
+                Some(editor) => editor.set_environment(path),
+                None => self.wait_for_scene(purpose, path),
+            },
             Purpose::Film => {
                 self.note = Some(Message::now(format!("reading {}", path.display()), false));
                 let started = self.files.films.start(ctx, "read film", move || read_film(path));
@@ -170,7 +223,7 @@ impl Window {
             }
             Purpose::Edits => match &mut self.editor {
                 Some(editor) => editor.open_edits(&path),
-                None => self.note = Some(Message::now("edits are opened after their scene".into(), true)),
+                None => self.wait_for_scene(purpose, path),
             },
             Purpose::SavePicture => self.engine.request(Request::SavePng(Destination::File(path))),
             Purpose::SaveFilm => self.engine.request(Request::SaveExr(Destination::File(path))),
@@ -182,42 +235,41 @@ impl Window {
         }
     }
 
+    fn wait_for_scene(&mut self, purpose: Purpose, path: PathBuf) {
+        self.note = Some(Message::now(format!("{} is taken when its scene is open", name_of(&path)), false));
+        self.files.wait(purpose, path);
+    }
+
     fn take_film(&mut self, read: FilmRead) {
-        let (path, result) = match read {
-            FilmRead::Film(path, result) => (path, result),
-            FilmRead::Image(path) => {
-                self.note = None;
-                if let Some(editor) = &mut self.editor {
-                    editor.set_environment(path);
-                }
-                return;
-            }
-        };
         self.note = None;
-        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
-        match (result, &mut self.scene, &self.editor) {
-            (Err(error), ..) => self.note = Some(Message::now(error.to_string(), true)),
-            (Ok(file), Some((_, navigation)), Some(editor)) => match belongs(&file, editor.document().version()) {
-                Ok(()) => {
-                    let view = navigation.standpoint.view;
-                    let aspect = view.tan_half.x / view.tan_half.y;
-                    let here = (view.film_from_view(), view.vfov());
-                    let (rotation, vfov) = super::opening::looking_at(&file.film.header, here, aspect);
-                    navigation.jump(file.film.header.pose.position, rotation, vfov);
-                    self.files.film = Some(Arc::new(file.film));
-                }
-                Err(reason) => self.note = Some(Message::now(format!("{name}: {reason}"), true)),
+        match read {
+            FilmRead::Film(path, Ok(file)) => self.resume(&path, file),
+            FilmRead::Film(_, Err(error)) => self.note = Some(Message::now(error.to_string(), true)),
+            FilmRead::Image(path) => match &mut self.editor {
+                Some(editor) => editor.set_environment(path),
+                None => self.wait_for_scene(Purpose::Environment, path),
             },
-            // The scene is still on its way.
-            (Ok(file), ..) => self.resume(file.film),
         }
     }
 
-    /// Has the engine go on with a film. What the window looks at must have been told before: a film that is looked at from
-    /// elsewhere starts anew.
-    pub(super) fn go_on_with_film(&mut self) {
-        if let Some(film) = self.files.film.take() {
-            self.engine.request(Request::GoOn(film));
+    /// Has the engine go on with a film once the scene has the environment that its edits name: a film is of both. What the window
+    /// looks at is told before: a film that is looked at from elsewhere starts anew.
+    pub(super) fn go_on_with_film(&mut self, ctx: &Context) {
+        let (Some((_, navigation)), Some(editor)) = (&mut self.scene, &self.editor) else { return };
+        let Some(film) = self.film.as_mut().filter(|_| !editor.awaits_environment()) else { return };
+        ctx.request_repaint();
+        let lacks = editor.document().wanted_environment();
+        if let Err(reason) = belongs(&film.file, editor.document().version(), lacks) {
+            self.note = Some(Message::now(format!("{}: {reason}", film.name), true));
+            self.film = None;
+        } else if !std::mem::replace(&mut film.is_seen, true) {
+            let view = navigation.standpoint.view;
+            let aspect = view.tan_half.x / view.tan_half.y;
+            let here = (view.film_from_view(), view.vfov());
+            let (rotation, vfov) = super::opening::looking_at(film.header(), here, aspect);
+            navigation.jump(film.header().pose.position, rotation, vfov);
+        } else if let Some(film) = self.film.take() {
+            self.engine.request(Request::GoOn(Arc::new(film.file.film)));
         }
     }
 
@@ -272,11 +324,32 @@ fn suggestion(purpose: Purpose, last: Option<&Path>, scene: &str, sidecar: Optio
     (beside.or(last.map(Path::to_owned)), name)
 }
 
-/// What a dropped file is for, by its name.
+fn name_of(path: &Path) -> String {
+    path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
+}
+
+/// The first of each kind of dropped files, a scene before what is for it, and the names of the others.
+fn one_of_each(dropped: Vec<PathBuf>) -> (Vec<(Purpose, PathBuf)>, Vec<String>) {
+    let (mut taken, mut left) = (Vec::<(Purpose, PathBuf)>::new(), Vec::new());
+    for path in dropped {
+        let purpose = purpose_of(&path);
+        if taken.iter().any(|(other, _)| *other == purpose) {
+            left.push(name_of(&path));
+        } else {
+            taken.push((purpose, path));
+        }
+    }
+    // Edits name an environment of their own: one that is dropped beside them comes after.
+    let order = [Purpose::Scene, Purpose::Edits, Purpose::Environment];
+    taken.sort_by_key(|(purpose, _)| order.iter().position(|other| other == purpose).unwrap_or(order.len()));
+    (taken, left)
+}
+
+/// What a dropped file is for, by its name, and by what is in it where edits have a name of their own.
 fn purpose_of(path: &Path) -> Purpose {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
     let is = |ending: &str| name.ends_with(ending);
-    if is(sidecar::ENDING) {
+    if is(sidecar::ENDING) || is(".json") && sidecar::is_edits(path) {
         Purpose::Edits
     } else if is(".hdr") {
         Purpose::Environment
@@ -297,13 +370,16 @@ fn read_film(path: PathBuf) -> FilmRead {
     }
 }
 
-/// Whether a film is of this version of the scene. Size, place, bounces and seed are taken from the film.
-fn belongs(file: &FilmFile, scene: &Scene) -> Result<(), String> {
+/// Whether a film is of this version of the scene, which `lacks` an environment image that could not be read. Size, place, bounces
+/// and seed are taken from the film.
+fn belongs(file: &FilmFile, scene: &Scene, lacks: Option<&Path>) -> Result<(), String> {
     if file.film.header.scene == scene.content_hash() {
         return Ok(());
     }
     let name = file.settings.get("scene").and_then(|name| name.as_str()).unwrap_or("another scene");
-    Err(if name == scene.name {
+    Err(if let Some(lacks) = lacks.filter(|_| name == scene.name) {
+        format!("scene: its edits name an environment that could not be read, {}", lacks.display())
+    } else if name == scene.name {
         format!("scene: another version of {name} (geometry, materials, lights, environment or cameras differ)")
     } else {
         format!("scene: {name} instead of {}", scene.name)
@@ -314,6 +390,8 @@ fn belongs(file: &FilmFile, scene: &Scene) -> Result<(), String> {
 #[expect(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use std::ffi::OsString;
+
+    use tracer::film::FilmSnapshot;
 
     use super::*;
     use crate::cli;
@@ -369,6 +447,20 @@ mod tests {
     }
 
     #[test]
+    fn of_dropped_files_the_scene_comes_first_and_one_of_each_kind_is_taken() {
+        let folder = std::env::temp_dir().join(format!("fovea-dropped-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        std::fs::write(folder.join("night.json"), r#"{ "format": "fovea-edits", "version": 1 }"#).unwrap();
+        std::fs::write(folder.join("scene.json"), r#"{ "asset": {} }"#).unwrap();
+        let dropped = ["sky.hdr", "night.json", "scene.json", "other.hdr", "room.glb"].map(|name| folder.join(name));
+        let (taken, left) = one_of_each(dropped.to_vec());
+        let wanted = [(Purpose::Scene, 2), (Purpose::Edits, 1), (Purpose::Environment, 0)];
+        assert_eq!(taken, wanted.map(|(purpose, index): (_, usize)| (purpose, dropped[index].clone())));
+        assert_eq!(left, ["other.hdr", "room.glb"]);
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
     fn a_film_of_another_scene_is_named() {
         let mut scene = tracer::builtin::scene().unwrap().0;
         let mut header = crate::output::header::tests::header(tracer::film::FilmMapping::Equirect);
@@ -376,11 +468,13 @@ mod tests {
         let film = FilmSnapshot { header, words: Vec::new() };
         let mut file = FilmFile { film, settings: serde_json::Map::new() };
         file.settings.insert("scene".into(), scene.name.clone().into());
-        assert_eq!(belongs(&file, &scene), Ok(()));
+        assert_eq!(belongs(&file, &scene, None), Ok(()));
         scene.backdrop = tracer::scene::Backdrop::Color(glam::Vec3::ONE);
-        assert!(belongs(&file, &scene).unwrap_err().contains("another version"));
+        assert!(belongs(&file, &scene, None).unwrap_err().contains("another version"));
+        let sky = Path::new("sky.hdr");
+        assert!(belongs(&file, &scene, Some(sky)).unwrap_err().contains("sky.hdr"));
         scene.name = "room.glb".into();
-        let reason = belongs(&file, &scene).unwrap_err();
+        let reason = belongs(&file, &scene, None).unwrap_err();
         assert!(reason.starts_with("scene: ") && reason.contains("room.glb"), "{reason}");
     }
 }

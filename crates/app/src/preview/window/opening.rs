@@ -6,7 +6,7 @@ use tracer::film::{FilmHeader, FilmMapping};
 
 use super::Window;
 use crate::preview::editor::Editor;
-use crate::preview::engine::{Message, Request};
+use crate::preview::engine::Message;
 use crate::preview::navigation::Navigation;
 use crate::preview::open_scene::OpenScene;
 use crate::preview::unsaved::{Decision, Next};
@@ -34,6 +34,7 @@ impl Window {
                 LoadEvent::NotOpened(text) => {
                     self.unsaved.keep();
                     self.give_up_sketch();
+                    self.files.forget_waiting(self.editor.is_some());
                     self.note = Some(Message::now(text, true));
                 }
                 LoadEvent::Broken(text) => self.broken = Some(text),
@@ -48,6 +49,7 @@ impl Window {
 
     /// Opens a scene, after a question where that would lose edits.
     pub(super) fn open_scene(&mut self, source: Source) {
+        self.files.forget_waiting(self.editor.is_some());
         if let Some(Next::Open(source)) = self.unsaved.allow(Next::Open(source), self.editor.as_ref()) {
             self.loader.open(source);
         }
@@ -59,12 +61,14 @@ impl Window {
             Some(Decision::GoOn(next)) => self.go_on(next, rect),
             // The loader follows the files of the other scene by now.
             Some(Decision::Stay(Next::Show(_))) => {
+                self.files.forget_waiting(true);
                 if let Some(watched) = self.watched.clone() {
                     self.going_back = true;
                     self.loader.follow(watched);
                 }
             }
-            Some(Decision::Stay(Next::Close | Next::Open(_))) | None => {}
+            Some(Decision::Stay(Next::Open(_))) => self.files.forget_waiting(true),
+            Some(Decision::Stay(Next::Close)) | None => {}
         }
     }
 
@@ -106,11 +110,9 @@ impl Window {
         let sketched = self.sketched.take().filter(|sketched| sketched == source).and_then(|_| self.scene.take());
         let navigation = sketched.map(|(_, navigation)| navigation).or_else(|| self.at_start(&open, rect));
         if let Some(navigation) = navigation {
-            if let Some(film) = self.resumed.take() {
-                self.engine.request(Request::GoOn(film));
-            }
             self.scene = Some((open, navigation));
             self.editor = Some(Editor::open(source, loaded));
+            self.files.scene_is_open();
             self.watched = Some(Watched::new(source, loaded));
         }
     }
@@ -121,9 +123,9 @@ impl Window {
         let start = open.viewpoints.get(open.start)?;
         let mut navigation = Navigation::new(start.position, start.rotation, start.vfov, aspect, open.diagonal);
         self.camera = open.start;
-        if let Some(film) = &self.resumed {
-            let (rotation, vfov) = looking_at(&film.header, (start.rotation, start.vfov), aspect);
-            navigation.jump(film.header.pose.position, rotation, vfov);
+        if let Some(film) = &self.film {
+            let (rotation, vfov) = looking_at(film.header(), (start.rotation, start.vfov), aspect);
+            navigation.jump(film.header().pose.position, rotation, vfov);
         }
         Some(navigation)
     }
