@@ -21,7 +21,7 @@ pub const PANEL_WIDTH: f32 = 272.0;
 /// Height of a row of a list, points.
 const ROW_HEIGHT: f32 = 19.0;
 /// Side of what opens and closes a branch, points.
-const ICON_SIZE: f32 = 14.0;
+const ICON_SIZE: f32 = 12.0;
 /// A tree with more nodes than this starts with closed branches.
 const OPEN_AT_FIRST: usize = 200;
 
