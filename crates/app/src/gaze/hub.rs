@@ -243,13 +243,15 @@ impl GazeHub {
         hub.target(view)
     }
 
-    /// The same for a batch of samples that begins now.
-    pub fn target_for_batch(&self, now: Instant, view: &View) -> Target {
-        let mut hub = self.lock();
-        hub.update(now);
-        let target = hub.target(view);
-        hub.timing.batch(now);
-        target
+    /// Says that a batch begins now, in a frame that began at `frame`, whose samples go where this one looked; `None` when they
+    /// go by no sample.
+    pub fn batch(&self, frame: Instant, now: Instant, sample: Option<SampleTimes>) {
+        self.lock().timing.batch(frame, now, sample);
+    }
+
+    /// Says that a frame goes by without a batch.
+    pub fn rests(&self) {
+        self.lock().timing.rests();
     }
 
     /// Says that a picture with samples of a batch is on its way to the screen.
@@ -394,7 +396,6 @@ impl Hub {
     fn take(&mut self, sample: &GazeSample) {
         let Some(entry) = self.entries.get(self.active) else { return };
         let times = SampleTimes { captured: sample.captured, arrived: sample.arrived, is_eye: entry.source.is_eye() };
-        self.timing.arrived(times);
         let Some(view) = self.views.at(sample.captured).copied() else { return };
         if !times.is_eye {
             let deg = self.place.deg(sample.point, None);
@@ -416,6 +417,7 @@ impl Hub {
         // What holds through a blink is a direction of the scene, taken when the lid closes.
         if matches!(phase, Phase::Fixation | Phase::Saccade) || before != Some(Phase::Blink) && phase == Phase::Blink {
             self.live = Some(Live { direction: self.place.direction(point_deg, sample.point, &view), times });
+            self.timing.arrived(times);
         }
     }
 

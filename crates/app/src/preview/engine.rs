@@ -359,10 +359,11 @@ impl Worker {
             let _ = self.sketch_scene(look);
         }
         // The window may have been drawn long ago; the eye has moved since.
-        let target = self.gaze.target_for_batch(Instant::now(), &look.standpoint.view);
-        self.sample = target.sample;
-        let gaze = Gaze { point: target.point };
-        let gaze = attention_tools::gaze(&look.controls.attention, &look.standpoint, gaze);
+        let began = Instant::now();
+        let target = self.gaze.target(began, &look.standpoint.view);
+        let followed = Gaze { point: target.point };
+        let gaze = attention_tools::gaze(&look.controls.attention, &look.standpoint, followed);
+        self.sample = target.sample.filter(|_| gaze == followed);
         let look = &Look { gaze, ..look.clone() };
         let changed = self.tracing.follow(look);
         if prepares {
@@ -375,7 +376,10 @@ impl Worker {
         if self.tracing.begin_trial(look.controls.trial) {
             self.start_film();
         }
-        if !look.controls.paused && !self.tracing.is_unfinished() {
+        if look.controls.paused || self.tracing.is_unfinished() {
+            self.gaze.rests();
+        } else {
+            self.gaze.batch(began, Instant::now(), self.sample);
             let (samples, took) = self.tracing.trace(self.pacing.batch())?;
             self.traced += took;
             self.pacing.measured(samples, took, self.show_time);

@@ -334,7 +334,7 @@ impl GazeControl {
             "sources": sources.collect::<Vec<_>>(),
             "arrival_to_batch_ms": report.timing.arrival_to_batch.map(|(median, _)| ms(median)),
             "longest_arrival_to_batch_ms": report.timing.arrival_to_batch.map(|(_, longest)| ms(longest)),
-            "longest_batch_interval_ms": report.timing.longest_frame.map(ms),
+            "longest_frame_ms": report.timing.longest_frame.map(ms),
             "age_ms": report.timing.age.map(ms),
             "recorded_rows": report.recording,
             "position_known": self.place.position_known,

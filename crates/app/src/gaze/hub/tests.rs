@@ -35,7 +35,7 @@ fn run(hub: &GazeHub, start: Instant, from_ms: u64, to_ms: u64) -> Target {
     for ms in (from_ms..=to_ms).step_by(10) {
         let now = start + Duration::from_millis(ms);
         hub.frame(now, place(), view(), Some([-0.5, 0.25]));
-        target = hub.target_for_batch(now, &view());
+        target = hub.target(now, &view());
     }
     target
 }
@@ -98,6 +98,31 @@ fn a_sample_goes_through_the_view_at_its_own_time() {
     let direction = view().direction_at(Vec2::new(0.5, 0.0));
     assert!(target.point.distance(turned.point_of(direction).unwrap()) < 1e-3, "{target:?}");
     std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn a_sample_waits_one_frame_where_every_frame_asks_and_longer_where_every_second_does() {
+    let start = Instant::now() + Duration::from_millis(START_MS);
+    let ms = Duration::from_millis;
+    for (asks_every, longest) in [(1, 30), (2, 60)] {
+        let (hub, path) = hub(0);
+        hub.frame(start, place(), view(), None);
+        let mut sample = None;
+        for frame in 0..30 {
+            // Frames of 33 ms, each with 3 ms until its batch begins.
+            let began = start + ms(33 * frame);
+            if frame % asks_every == 0 {
+                sample = hub.target(began, &view()).sample;
+            }
+            hub.batch(began, began + ms(3), sample);
+        }
+        let timing = hub.report(start + ms(33 * 30)).timing;
+        assert_eq!(timing.longest_frame, Some(ms(36)), "frames are as long either way");
+        let (_, found) = timing.arrival_to_batch.unwrap();
+        assert!(found.abs_diff(ms(longest)) <= ms(10), "{found:?} where every {asks_every}. frame asks");
+        assert_eq!(found <= ms(36), asks_every == 1);
+        std::fs::remove_file(path).unwrap();
+    }
 }
 
 #[test]

@@ -17,11 +17,11 @@ pub const TOO_OLD: Duration = Duration::from_millis(70);
 /// Figures over the last three seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TimingReport {
-    /// From the arrival of a sample to the first batch that could go by it: median and largest, over all samples.
+    /// From the arrival of a sample to the first batch that goes by it or a newer one: median and largest, over all samples.
     pub arrival_to_batch: Option<(Duration, Duration)>,
     /// From the eye to the picture: median.
     pub age: Option<Duration>,
-    /// From the beginning of one batch to that of the next, with the picture between them: largest.
+    /// From the beginning of one frame of the tracing thread, whether or not it asks for the gaze, to the batch of the next: largest.
     pub longest_frame: Option<Duration>,
 }
 
@@ -38,28 +38,36 @@ pub struct Timing {
     waits: Recent,
     ages: Recent,
     frames: Recent,
-    last_batch: Option<Instant>,
-    /// Arrivals since the last batch.
+    /// When the last frame began that traced a batch.
+    last_frame: Option<Instant>,
+    /// Arrivals of the samples that no batch has gone by, oldest first.
     waiting: VecDeque<Instant>,
 }
 
 impl Timing {
-    /// A sample has come.
+    /// A sample has become the gaze.
     pub fn arrived(&mut self, sample: SampleTimes) {
         // Before the first batch there is nothing to wait for.
-        if sample.is_eye && self.last_batch.is_some() && self.waiting.len() < WAITING {
+        if sample.is_eye && self.last_frame.is_some() && self.waiting.len() < WAITING {
             self.waiting.push_back(sample.arrived);
         }
     }
 
-    /// A batch begins, and goes by the newest of the samples that have come.
-    pub fn batch(&mut self, now: Instant) {
-        if let Some(last) = self.last_batch.replace(now) {
+    /// A batch begins now, in a frame that began at `frame`, and goes by a sample, or by none that came.
+    pub fn batch(&mut self, frame: Instant, now: Instant, sample: Option<SampleTimes>) {
+        if let Some(last) = self.last_frame.replace(frame) {
             self.frames.keep(now, now.saturating_duration_since(last));
         }
-        for arrived in self.waiting.drain(..) {
+        let Some(sample) = sample else { return self.waiting.clear() };
+        while let Some(arrived) = self.waiting.pop_front_if(|arrived| *arrived <= sample.arrived) {
             self.waits.keep(now, now.saturating_duration_since(arrived));
         }
+    }
+
+    /// A frame traces nothing, so that no sample waits for it.
+    pub fn rests(&mut self) {
+        self.last_frame = None;
+        self.waiting.clear();
     }
 
     /// A picture is done, whose newest batch was traced for a sample.
@@ -115,16 +123,18 @@ mod tests {
         let at = |ms: u64| start + Duration::from_millis(ms);
         let eye = |captured, arrived| Some(SampleTimes { captured: at(captured), arrived: at(arrived), is_eye: true });
         let mut timing = Timing::default();
-        timing.batch(at(12));
+        timing.batch(at(11), at(12), None);
         [20, 24, 29].into_iter().filter_map(|ms| eye(ms - 10, ms)).for_each(|sample| timing.arrived(sample));
-        timing.batch(at(30));
-        timing.batch(at(45));
+        timing.batch(at(26), at(30), eye(14, 24));
+        timing.batch(at(42), at(45), eye(19, 29));
         timing.shown(at(60), eye(10, 20));
-        timing.batch(at(62));
+        timing.batch(at(61), at(62), eye(19, 29));
         let report = timing.report();
-        assert_eq!(report.arrival_to_batch, Some((Duration::from_millis(6), Duration::from_millis(10))));
-        assert_eq!(report.age, Some(Duration::from_millis(50)));
-        assert_eq!(report.longest_frame, Some(Duration::from_millis(18)));
+        let ms = Duration::from_millis;
+        // Ten, six, and sixteen of that which the first batch did not go by.
+        assert_eq!(report.arrival_to_batch, Some((ms(10), ms(16))));
+        assert_eq!(report.age, Some(ms(50)));
+        assert_eq!(report.longest_frame, Some(ms(20)));
         assert!(!report.is_too_old());
         (0..300).for_each(|_| timing.shown(at(200), eye(100, 120)));
         assert!(timing.report().is_too_old());
@@ -136,5 +146,12 @@ mod tests {
         };
         timing.shown(at(4100), Some(pointer));
         assert_eq!(timing.report().age, None);
+        // What comes while nothing is traced waits for nothing.
+        eye(4100, 4110).into_iter().for_each(|sample| timing.arrived(sample));
+        timing.rests();
+        eye(4190, 4200).into_iter().for_each(|sample| timing.arrived(sample));
+        timing.batch(at(9000), at(9001), eye(4190, 4200));
+        assert_eq!(timing.report().arrival_to_batch, report.arrival_to_batch);
+        assert_eq!(timing.report().longest_frame, report.longest_frame);
     }
 }
