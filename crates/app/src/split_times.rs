@@ -138,6 +138,13 @@ impl Run {
         }
     }
 
+    /// The present trial's picture was disturbed: it is shown anew, from an empty film.
+    pub fn begin_trial_again(&mut self) {
+        if let Some(trial) = self.trials.get_mut(self.current) {
+            trial.outline = None;
+        }
+    }
+
     /// Trials that are complete.
     pub fn trials(&self) -> &[Trial] {
         &self.trials[..self.current]

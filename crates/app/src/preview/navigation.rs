@@ -100,12 +100,16 @@ impl Navigation {
         self.held = None;
     }
 
+    /// Takes the proportions of the picture's place.
+    pub fn fit(&mut self, rect: Rect) {
+        self.standpoint.view = self.standpoint.view.with_aspect(rect.width() / rect.height().max(1.0));
+    }
+
     /// Takes one frame's input into account. `response` covers the picture; keys count unless a widget wants them. `pivot` says
     /// about which point of the world a movement that begins at a place of the window goes.
     pub fn update(&mut self, ui: &egui::Ui, response: &egui::Response, pivot: impl FnOnce(Pos2) -> Vec3) {
         let rect = response.rect;
-        let aspect = rect.width() / rect.height().max(1.0);
-        self.standpoint.view = self.standpoint.view.with_aspect(aspect);
+        self.fit(rect);
         self.drag(response, pivot);
         if response.hovered() {
             let (scroll, pinch) = ui.input(|input| (input.smooth_scroll_delta().y, input.zoom_delta()));

@@ -13,7 +13,7 @@ use super::engine::{HeadsetReadout, Message};
 use super::file_menu;
 use super::histogram;
 use super::seeing;
-use super::split_panel::SplitTimes;
+use super::split_panel::{self, SplitTimes};
 use super::theme;
 use crate::cli::choices::{Clip, EccentricityAt, Mode, Model};
 use crate::cli::values::EXPOSURE_EV;
@@ -175,7 +175,11 @@ pub fn panel(
                 attention_tools::panel(ui, tools, &mut controls.attention, facts.gaze);
             });
             ui.collapsing("Split times", |ui| {
-                actions.extend(split.show(ui, facts.selected, Instant::now()).map(Action::Tell));
+                // Before the first picture of a scene there is nothing to time.
+                ui.add_enabled_ui(!facts.film.is_empty(), |ui| {
+                    let scene = split_panel::Scene { name: facts.scene, adapter: facts.adapter };
+                    actions.extend(split.show(ui, facts.selected, &scene, Instant::now()).map(Action::Tell));
+                });
             });
             ui.collapsing("Pixel at the gaze", |ui| pixel(ui, facts));
             ui.collapsing("Sampling and screen", |ui| sampling(ui, facts, controls, visibility));

@@ -1,10 +1,10 @@
-//! The split times in the window: a panel to start a run, keys while it goes on, files when it is done.
+//! The split times in the window: a panel to start a run, keys while it goes on, files when it ends.
 
 use std::path::PathBuf;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
 
-use egui::{Align2, Area, Context, DragValue, Id, Key, Modifiers, RichText, Ui};
+use egui::{Align2, Area, Context, DragValue, Id, Key, Modifiers, RichText, Ui, Vec2};
 use tracer::provenance::Provenance;
 
 use super::controls::{Controls, MODES};
@@ -18,9 +18,9 @@ use crate::split_times::{After, Moment, Plan, Run};
 /// How long until the window looks whether results are written.
 const LOOK_AGAIN: Duration = Duration::from_millis(50);
 
-/// A run that is done.
+/// A run with what it is measured on.
 #[derive(Clone, Debug)]
-struct Finished {
+struct Measured {
     run: Run,
     scene: String,
     adapter: String,
@@ -32,24 +32,31 @@ pub struct SplitTimes {
     pub plan: Plan,
     /// Where results go: the first that can be written counts.
     pub folders: Vec<PathBuf>,
-    run: Option<Run>,
+    measured: Option<Measured>,
     /// When the film of the present trial was emptied.
     started: Option<Instant>,
     /// Trials that were shown, of all runs.
     shown: u64,
+    /// The picture's size, points.
+    size: Option<Vec2>,
     /// The last run's medians.
     summary: Vec<String>,
     /// Runs whose results are on their way to their files, and those that could be written nowhere.
-    writing: Option<JoinHandle<(Message, Vec<Finished>)>>,
-    unwritten: Vec<Finished>,
+    writing: Option<JoinHandle<(Message, Vec<Measured>)>>,
+    unwritten: Vec<Measured>,
 }
 
 impl Drop for SplitTimes {
     /// A window that closes waits for the results: nobody can repeat them.
     fn drop(&mut self) {
-        if let Some(writing) = self.writing.take() {
-            // A panic of the thread has been reported by the panic hook.
-            let _ = writing.join();
+        self.end();
+        // A panic of the thread has been reported by the panic hook.
+        if let Some(Ok((_, left))) = self.writing.take().map(JoinHandle::join) {
+            self.unwritten.extend(left);
+        }
+        if !self.unwritten.is_empty() {
+            let (told, _) = write_all(&self.folders, std::mem::take(&mut self.unwritten));
+            eprintln!("{}", told.text);
         }
     }
 }
@@ -62,9 +69,10 @@ impl Default for SplitTimes {
         Self {
             plan,
             folders: folders.into_iter().flatten().collect(),
-            run: None,
+            measured: None,
             started: None,
             shown: 0,
+            size: None,
             summary: Vec::new(),
             writing: None,
             unwritten: Vec::new(),
@@ -75,19 +83,23 @@ impl Default for SplitTimes {
 impl SplitTimes {
     /// Whether a run goes on whose mode the person must not see.
     pub fn hides_mode(&self) -> bool {
-        self.run.as_ref().is_some_and(|run| run.plan().blind)
+        self.run().is_some_and(|run| run.plan().blind)
     }
 
     /// What the picture is to show: while a run goes on the mode of its trial alone, whatever else is set.
     pub fn controls(&self, set: &Controls) -> Controls {
-        match self.run.as_ref().and_then(Run::mode) {
+        match self.run().and_then(Run::mode) {
             Some(mode) => Controls { mode, comparison: None, paused: false, trial: Some(self.shown), ..set.clone() },
             None => set.clone(),
         }
     }
 
+    fn run(&self) -> Option<&Run> {
+        self.measured.as_ref().map(|measured| &measured.run)
+    }
+
     /// Draws the panel's part; `selected` names what is selected in the scene.
-    pub fn show(&mut self, ui: &mut Ui, selected: &str, now: Instant) -> Option<Message> {
+    pub fn show(&mut self, ui: &mut Ui, selected: &str, scene: &Scene<'_>, now: Instant) -> Option<Message> {
         for (mode, name, hint) in MODES {
             let mut wanted = self.plan.modes.contains(&mode);
             if ui.checkbox(&mut wanted, format!("Compare {name}")).on_hover_text(hint).changed() {
@@ -103,7 +115,8 @@ impl SplitTimes {
             ui.checkbox(&mut self.plan.blind, "Blind").on_hover_text("The person does not see which mode it is");
         });
         let started = ui.add_enabled(!self.plan.modes.is_empty(), egui::Button::new("Start split times"));
-        let hint = "Looks at what is selected: O when its outline is visible, P when its material is; Esc ends the run";
+        let hint = "Looks at what is selected: O when its outline is visible, P when its material is; Esc ends the run and keeps \
+                    the trials that are done";
         for line in &self.summary {
             ui.label(RichText::new(line).small());
         }
@@ -115,30 +128,64 @@ impl SplitTimes {
         }
         selected.clone_into(&mut self.plan.object);
         let seed = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(1, |time| time.as_nanos() as u64);
-        self.start(seed, now)
+        self.start(seed, scene, now)
     }
 
     /// Starts a run, unless its results could be written nowhere; what there is to tell.
-    pub fn start(&mut self, seed: u64, now: Instant) -> Option<Message> {
+    pub fn start(&mut self, seed: u64, scene: &Scene<'_>, now: Instant) -> Option<Message> {
         let told = match somewhere(&self.folders, |[csv, _]| check_writable(csv)) {
             (None, error) => return Some(Message::now(format!("no split times: {}", reason(error)), true)),
             (Some(_), None) => None,
             (Some([csv, _]), error) => Some(format!("{}; split times will be {}", reason(error), csv.display())),
         };
-        self.run = Run::new(self.plan.clone(), seed);
+        let [scene, adapter] = [scene.name, scene.adapter].map(ToOwned::to_owned);
+        self.measured = Run::new(self.plan.clone(), seed).map(|run| Measured { run, scene, adapter });
+        self.begin_trial(now);
+        told.map(|text| Message::now(text, true))
+    }
+
+    fn begin_trial(&mut self, now: Instant) {
         self.started = Some(now);
         self.shown += 1;
-        told.map(|text| Message::now(text, true))
     }
 
     /// Whether a run goes on.
     pub fn is_running(&self) -> bool {
-        self.run.is_some()
+        self.measured.is_some()
     }
 
-    /// Ends the run without results.
-    pub fn stop(&mut self) {
-        self.run = None;
+    /// The film was lost or replaced: the present trial begins again.
+    pub fn begin_trial_again(&mut self, now: Instant) {
+        if let Some(measured) = &mut self.measured {
+            measured.run.begin_trial_again();
+            self.begin_trial(now);
+        }
+    }
+
+    /// Says how large the picture is, in points; one of another size may be of another film.
+    pub fn follow_size(&mut self, size: Vec2, now: Instant) {
+        if self.size.replace(size).is_some_and(|before| before != size) {
+            self.begin_trial_again(now);
+        }
+    }
+
+    /// Ends the run; the trials that are done are its results.
+    pub fn stop(&mut self) -> Option<Message> {
+        // Results that are being written come back before others go.
+        if self.end() && self.writing.is_none() { self.write() } else { None }
+    }
+
+    /// The same without writing anything; whether there are results.
+    fn end(&mut self) -> bool {
+        let Some(measured) = self.measured.take().filter(|measured| !measured.run.trials().is_empty()) else {
+            return false;
+        };
+        let line = |(mode, count, outline, material)| {
+            format!("{}: outline {outline:.1} s, material {material:.1} s ({count})", name(mode))
+        };
+        self.summary = measured.run.medians().into_iter().map(line).collect();
+        self.unwritten.push(measured);
+        true
     }
 
     /// Tells that results have been written, or why not.
@@ -156,13 +203,16 @@ impl SplitTimes {
     }
 
     /// Takes the run's keys. `samples` and `gaze_deg` are those of this moment.
-    pub fn keys(&mut self, ctx: &Context, now: Instant, moment: (u64, [f64; 2]), scene: &Scene<'_>) -> Option<Message> {
-        let run = self.run.as_mut()?;
+    pub fn keys(&mut self, ctx: &Context, now: Instant, moment: (u64, [f64; 2])) -> Option<Message> {
+        let Measured { run, .. } = self.measured.as_mut()?;
         // Letters of a text are no answers.
         if ctx.egui_wants_keyboard_input() {
             return None;
         }
         let pressed = |key| ctx.input_mut(|input| input.consume_key(Modifiers::NONE, key));
+        if pressed(Key::Escape) {
+            return self.stop();
+        }
         let elapsed = self.started.map_or(Duration::ZERO, |started| now.saturating_duration_since(started));
         let moment = Moment { elapsed, samples: moment.0, gaze_deg: moment.1 };
         if pressed(Key::O) {
@@ -174,24 +224,11 @@ impl SplitTimes {
         match run.material(moment) {
             After::Nothing | After::Kept => None,
             After::NextTrial => {
-                self.started = Some(now);
-                self.shown += 1;
+                self.begin_trial(now);
                 None
             }
-            After::Done => self.finish(scene),
+            After::Done => self.stop(),
         }
-    }
-
-    fn finish(&mut self, scene: &Scene<'_>) -> Option<Message> {
-        let run = self.run.take()?;
-        let line = |(mode, count, outline, material)| {
-            format!("{}: outline {outline:.1} s, material {material:.1} s ({count})", name(mode))
-        };
-        self.summary = run.medians().into_iter().map(line).collect();
-        let [scene, adapter] = [scene.name, scene.adapter].map(ToOwned::to_owned);
-        self.unwritten.push(Finished { run, scene, adapter });
-        // Results that are being written come back before others go.
-        if self.writing.is_some() { None } else { self.write() }
     }
 
     /// Writes the results of all runs that are not written yet; why that cannot begin.
@@ -210,7 +247,7 @@ impl SplitTimes {
 
     /// Says what is waited for, at the top of the window.
     pub fn banner(&self, ctx: &Context) {
-        let Some(run) = &self.run else { return };
+        let Some(run) = self.run() else { return };
         let (trial, all) = run.progress();
         let mode = run.mode().filter(|_| !run.plan().blind).map_or("", name);
         let wanted = if run.waits_for_outline() { "O: the outline is visible" } else { "P: the material is visible" };
@@ -252,10 +289,10 @@ fn reason(error: Option<OutputError>) -> String {
 }
 
 /// Writes results where that can be done; what there is to tell, and the runs whose results could be written nowhere.
-fn write_all(folders: &[PathBuf], runs: Vec<Finished>) -> (Message, Vec<Finished>) {
+fn write_all(folders: &[PathBuf], runs: Vec<Measured>) -> (Message, Vec<Measured>) {
     let (mut told, mut wrong, mut left) = (Vec::new(), false, Vec::new());
-    for finished in runs {
-        let Finished { run, scene, adapter } = &finished;
+    for measured in runs {
+        let Measured { run, scene, adapter } = &measured;
         let texts = [run.csv(scene, &Provenance::without_gpu(adapter)), run.svg()];
         let (names, error) = somewhere(folders, |names| write(names, &texts));
         wrong |= error.is_some();
@@ -264,7 +301,7 @@ fn write_all(folders: &[PathBuf], runs: Vec<Finished>) -> (Message, Vec<Finished
             Some([csv, _]) => told.push(format!("{elsewhere}{} and its .svg", csv.display())),
             None => {
                 told.push(format!("{elsewhere}the results are kept until they can be written (Split times)"));
-                left.push(finished);
+                left.push(measured);
             }
         }
     }

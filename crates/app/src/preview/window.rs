@@ -24,7 +24,7 @@ use super::open_scene::OpenScene;
 use super::overlay::{self, Action, Facts, Visibility};
 use super::screenshot::Screenshot;
 use super::seeing;
-use super::split_panel::{self, SplitTimes};
+use super::split_panel::SplitTimes;
 use super::unsaved::Unsaved;
 use super::versions::Versions;
 use crate::cli::PreviewArgs;
@@ -38,6 +38,10 @@ use crate::session::Source;
 mod files;
 mod keys;
 mod opening;
+#[cfg(test)]
+mod tests;
+#[cfg(test)]
+mod timed_tests;
 
 /// How long a note stays.
 const NOTE: Duration = Duration::from_secs(5);
@@ -155,6 +159,7 @@ impl Window {
         (self.engine, self.adapter, self.mode_presses) = (engine, adapter, 0);
         self.versions = Versions::default();
         self.unsaved.renew();
+        self.split.begin_trial_again(Instant::now());
         self.note =
             Some(Message::now("the graphics device was lost; the film goes on from its last snapshot".into(), false));
     }
@@ -195,7 +200,11 @@ impl Window {
     fn overlay(&mut self, ctx: &Context, state: &State, deg_per_px: f32) {
         self.split.banner(ctx);
         let selected = self.editor.as_ref().map(Editor::selected_name).unwrap_or_default();
-        let shown = self.visibility.panel && !self.split.hides_mode();
+        // Who is timed sees the picture and changes nothing.
+        if self.split.is_running() {
+            return self.message(ctx, state);
+        }
+        let shown = self.visibility.panel;
         if let Some((scene, _)) = self.scene.as_ref().filter(|_| shown) {
             let cameras: Vec<String> = scene.viewpoints.iter().map(|viewpoint| viewpoint.name.clone()).collect();
             let facts = Facts {
@@ -235,17 +244,17 @@ impl Window {
         self.message(ctx, state);
     }
 
-    /// What the keys of a run of split times do.
-    fn split_keys(&mut self, ctx: &Context, state: &State) {
-        if let Some(told) = self.split.written(ctx) {
-            self.note = Some(told);
-        }
-        let Some((open, _)) = &self.scene else { return };
+    /// What a run of split times does with keys, a window of another size, and one that closes.
+    fn follow_split(&mut self, ctx: &Context, size: egui::Vec2, state: &State) {
+        let now = Instant::now();
+        let closes = ctx.input(|input| input.viewport().close_requested());
+        let told = self.split.written(ctx).or_else(|| if closes { self.split.stop() } else { None });
+        self.note = told.or(self.note.take());
+        self.split.follow_size(size, now);
         let gaze = self.gaze_direction.unwrap_or(Vec3::NEG_Z);
         let (yaw, pitch) = crate::view::yaw_pitch(gaze);
         let gaze_deg = [yaw, pitch].map(|angle| f64::from(angle.to_degrees()));
-        let scene = split_panel::Scene { name: &open.name, adapter: &self.adapter };
-        let told = self.split.keys(ctx, Instant::now(), (state.readout.samples, gaze_deg), &scene);
+        let told = self.split.keys(ctx, now, (state.readout.samples, gaze_deg));
         self.note = told.or(self.note.take());
     }
 
@@ -334,7 +343,9 @@ impl Window {
     fn follow_presses(&mut self, state: &State) {
         while self.mode_presses < state.mode_presses {
             self.mode_presses += 1;
-            self.controls.mode = seeing::next_mode(self.controls.mode);
+            if !self.split.is_running() {
+                self.controls.mode = seeing::next_mode(self.controls.mode);
+            }
         }
     }
 }
@@ -352,9 +363,7 @@ impl eframe::App for Window {
             self.unsaved.follow_close(&ctx, self.editor.as_ref());
         }
         self.follow_loader(rect);
-        if !self.unsaved.is_asking() {
-            self.split_keys(&ctx, &state);
-        }
+        self.follow_split(&ctx, rect.size(), &state);
         self.keys(&ctx, state.headset.is_some());
         self.follow_presses(&state);
         if state.headset.is_some() {
@@ -362,6 +371,8 @@ impl eframe::App for Window {
             self.controls.comparison = None;
         }
         match (&mut self.scene, &mut self.editor) {
+            // A film that is seen from elsewhere starts anew, and whoever is timed does not.
+            (Some((_, navigation)), _) if self.split.is_running() => navigation.fit(rect),
             (Some((_, navigation)), Some(editor)) => {
                 let attention = &mut self.controls.attention;
                 let standpoint = navigation.standpoint;
@@ -424,7 +435,8 @@ impl eframe::App for Window {
             if let Some(comparison) = self.controls.comparison.as_mut().filter(|_| compares) {
                 compare::wipe(ui, rect, self.controls.mode, comparison, &state.readout);
             }
-            if let Some(editor) = self.editor.as_mut().filter(|_| !self.gaze.shows_dots()) {
+            let marks = !self.gaze.shows_dots() && !self.split.is_running();
+            if let Some(editor) = self.editor.as_mut().filter(|_| marks) {
                 editor.draw(ui, rect, &look.standpoint);
             }
             self.engine.look(look);
@@ -464,6 +476,3 @@ impl eframe::App for Window {
         [0.04, 0.04, 0.045, 1.0]
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -5,6 +5,8 @@ use fovea_app::preview::split_panel;
 
 use super::*;
 
+const SCENE: split_panel::Scene<'_> = split_panel::Scene { name: "room.glb", adapter: "an adapter" };
+
 #[test]
 fn a_run_of_split_times_goes_through_its_modes_and_writes_its_results() {
     let folder = std::env::temp_dir().join(format!("fovea-split-{}", std::process::id()));
@@ -17,12 +19,11 @@ fn a_run_of_split_times_goes_through_its_modes_and_writes_its_results() {
     let mut set = Controls::from(&args());
     (set.paused, set.comparison) = (true, Some(Comparison::default()));
     assert_eq!(split.controls(&set), set);
-    assert!(split.start(5, Instant::now()).is_none() && split.hides_mode());
+    assert!(split.start(5, &SCENE, Instant::now()).is_none() && split.hides_mode());
     let mut note = String::new();
     let draw = move |ui: &mut egui::Ui, (split, told): &mut (SplitTimes, Vec<Message>)| {
-        let scene = split_panel::Scene { name: "room.glb", adapter: "an adapter" };
         told.extend(split.written(ui.ctx()));
-        told.extend(split.keys(ui.ctx(), Instant::now(), (1000, [0.0, 0.0]), &scene));
+        told.extend(split.keys(ui.ctx(), Instant::now(), (1000, [0.0, 0.0])));
         split.banner(ui.ctx());
         let label = ui.label("Note");
         ui.text_edit_singleline(&mut note).labelled_by(label.id);
@@ -86,16 +87,15 @@ fn a_run_of_split_times_outlives_folders_that_cannot_be_written() {
     let mut split = SplitTimes::default();
     split.folders = vec![first.clone(), second.clone()];
     (split.plan.repetitions, split.plan.modes) = (1, vec![Mode::Fv]);
-    let told = split.start(5, Instant::now()).unwrap();
+    let told = split.start(5, &SCENE, Instant::now()).unwrap();
     assert!(told.wrong && !split.is_running(), "nothing is asked of anybody in vain: {told:?}");
     std::fs::create_dir_all(&second).unwrap();
-    let told = split.start(5, Instant::now()).unwrap();
+    let told = split.start(5, &SCENE, Instant::now()).unwrap();
     assert!(split.is_running() && told.text.contains("second"), "{told:?}");
     let draw = |ui: &mut egui::Ui, (split, told): &mut (SplitTimes, Vec<Message>)| {
-        let scene = split_panel::Scene { name: "room.glb", adapter: "an adapter" };
         told.extend(split.written(ui.ctx()));
-        told.extend(split.keys(ui.ctx(), Instant::now(), (1000, [0.0, 0.0]), &scene));
-        told.extend(split.show(ui, "", Instant::now()));
+        told.extend(split.keys(ui.ctx(), Instant::now(), (1000, [0.0, 0.0])));
+        told.extend(split.show(ui, "", &SCENE, Instant::now()));
     };
     let mut harness = harness(draw, (split, Vec::new()));
     std::fs::remove_dir_all(&folder).unwrap();
@@ -112,5 +112,42 @@ fn a_run_of_split_times_outlives_folders_that_cannot_be_written() {
     wait_for_results(&mut harness, 2);
     assert!(std::fs::read_to_string(second.join("split-times-1.csv")).unwrap().contains(",room.glb,"));
     assert!(harness.query_by_label("Write results again").is_none());
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn a_run_that_is_stopped_keeps_the_trials_that_are_done() {
+    let folder = std::env::temp_dir().join(format!("fovea-split-stopped-{}", std::process::id()));
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    let rows = |number: u32| {
+        let csv = std::fs::read_to_string(folder.join(format!("split-times-{number}.csv"))).unwrap();
+        csv.lines().filter(|line| line.contains(",room.glb,")).count()
+    };
+    let draw = |ui: &mut egui::Ui, (split, told): &mut (SplitTimes, Vec<Message>)| {
+        told.extend(split.written(ui.ctx()));
+        told.extend(split.keys(ui.ctx(), Instant::now(), (1000, [0.0, 0.0])));
+    };
+    let mut split = SplitTimes::default();
+    split.folders = vec![folder.clone()];
+    let mut harness = harness(draw, (split, Vec::new()));
+    let press = |harness: &mut Harness<'_, (SplitTimes, Vec<Message>)>, keys: &[egui::Key]| {
+        assert!(harness.state_mut().0.start(5, &SCENE, Instant::now()).is_none());
+        for key in keys {
+            harness.key_press(*key);
+            harness.run_steps(2);
+        }
+    };
+    // Without a trial that is done there is nothing to keep.
+    press(&mut harness, &[egui::Key::O, egui::Key::Escape]);
+    assert!(!harness.state().0.is_running() && std::fs::read_dir(&folder).unwrap().next().is_none());
+    press(&mut harness, &[egui::Key::O, egui::Key::P, egui::Key::O, egui::Key::Escape]);
+    wait_for_results(&mut harness, 1);
+    assert!(!harness.state().1[0].wrong && !harness.state().0.is_running());
+    assert_eq!(rows(1), 1);
+    // The window closes meanwhile.
+    press(&mut harness, &[egui::Key::O, egui::Key::P, egui::Key::O, egui::Key::P]);
+    drop(harness);
+    assert_eq!(rows(2), 2);
     std::fs::remove_dir_all(folder).unwrap();
 }

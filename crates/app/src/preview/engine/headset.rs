@@ -181,6 +181,8 @@ impl Worker {
         for press in presses {
             match press {
                 Press::NextMode => lock(&self.shared.state).mode_presses += 1,
+                // The film of a trial has begun with its clock.
+                Press::Restart if look.controls.trial.is_some() => {}
                 Press::Restart => self.carry_out(Request::Restart),
                 Press::Marker => self.toggle_marker(),
             }

@@ -154,7 +154,7 @@ impl Window {
 
     /// Takes dropped files, answers of dialogs, films that were read, and what has changed of the settings.
     pub(super) fn follow_files(&mut self, ctx: &Context, frame: &eframe::Frame) {
-        if !self.unsaved.is_asking() {
+        if !self.unsaved.is_asking() && !self.split.is_running() {
             self.take_files(ctx, frame);
         }
         self.remember(ctx, frame);

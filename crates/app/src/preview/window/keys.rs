@@ -16,9 +16,6 @@ impl Window {
         }
         // Nothing else may change what somebody is timed on.
         if self.split.is_running() {
-            if ctx.input_mut(|input| input.consume_key(Modifiers::NONE, Key::Escape)) {
-                self.split.stop();
-            }
             return;
         }
         const NUMBERS: [Key; 9] =

@@ -14,9 +14,11 @@ use crate::reload::{LoadEvent, Sketchable, Watched};
 use crate::session::{Loaded, Source};
 
 impl Window {
-    /// Takes what the loader has: a new scene starts from its camera, a new version of the same one keeps the view.
+    /// Takes what the loader has: a new scene starts from its camera, a new version of the same one keeps the view. While somebody
+    /// is timed it waits.
     pub(super) fn follow_loader(&mut self, rect: Rect) {
         while !self.unsaved.is_asking()
+            && !self.split.is_running()
             && let Some(event) = self.loader.poll()
         {
             match event {

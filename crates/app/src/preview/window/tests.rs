@@ -14,8 +14,9 @@ use crate::gaze::hub::GazeHub;
 use crate::reload::rule::Timing;
 use crate::session;
 
+/// A file as the system drops it.
 #[derive(Debug)]
-struct Dropped(PathBuf);
+pub(super) struct Dropped(pub PathBuf);
 
 impl egui::DroppedFile for Dropped {
     fn path(&self) -> &Path {
