@@ -1,7 +1,7 @@
 //! From raw rows to what the report says: curves, ratios at equal error, split times.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use serde_json::Value;
@@ -15,6 +15,9 @@ use super::statistics::{self, Crossing, Curve, Estimate};
 /// Largest share of empty foveal pixels at which curves are compared at equal error: with fewer than about 1.6 samples a pixel
 /// the error of the pixels that have one hardly depends on their number.
 const MOST_EMPTY: f64 = 0.2;
+
+/// The numbers of the page, with each scene's settings.
+pub const SUMMARY: &str = "study.json";
 
 /// All raw data of a study.
 #[derive(Clone, Debug, Default)]
@@ -67,17 +70,25 @@ impl Sooner {
 }
 
 impl Analysis {
-    /// Reads a study's folder.
+    /// Reads a study's folder, or what is kept of one that is done: `curves.csv`, `rates.csv` and `study.json`.
     ///
     /// # Errors
     /// When a file in it is not what a study made.
     pub fn read(folder: &Path) -> anyhow::Result<Self> {
         let table = record::read_all(folder)?;
+        let read = |path: PathBuf| -> anyhow::Result<Value> {
+            let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+            serde_json::from_str(&text).with_context(|| path.display().to_string())
+        };
+        let references = folder.join("references");
+        let kept = if references.exists() { None } else { Some(read(folder.join(SUMMARY))?) };
         let names: BTreeSet<&str> = table.keys().map(|key| key.scene.as_str()).collect();
         let settings = names.into_iter().map(|scene| {
-            let path = folder.join("references").join(format!("{scene}.json"));
-            let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
-            Ok((scene.to_owned(), serde_json::from_str(&text).with_context(|| path.display().to_string())?))
+            let settings = match &kept {
+                Some(kept) => kept["settings"][scene].clone(),
+                None => read(references.join(format!("{scene}.json")))?,
+            };
+            Ok((scene.to_owned(), settings))
         });
         let settings = settings.collect::<anyhow::Result<_>>()?;
         Ok(Self { table, rates: Rates::read(folder)?, settings })

@@ -166,19 +166,28 @@ pub fn write(folder: &Path, key: &RunKey, rows: &Vec<Row>) -> anyhow::Result<()>
     Ok(write_text(&key.path(folder), &to_csv([(key, rows)]))?)
 }
 
-/// Reads all finished runs.
+/// All runs of a study that is done.
+pub const ALL_RUNS: &str = "curves.csv";
+
+/// Reads all finished runs, a file each; where only all of them together were kept, that file.
 ///
 /// # Errors
-/// When a file is not what [`write`] made.
+/// When a file is not what [`to_csv`] made.
 pub fn read_all(folder: &Path) -> anyhow::Result<Table> {
-    let runs = folder.join("runs");
+    let read = |path: &Path| -> anyhow::Result<Table> {
+        let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
+        from_csv(&text).with_context(|| path.display().to_string())
+    };
+    let (runs, all) = (folder.join("runs"), folder.join(ALL_RUNS));
+    if !runs.exists() && all.exists() {
+        return read(&all);
+    }
     let mut table = Table::new();
     let entries = std::fs::read_dir(&runs).with_context(|| format!("{} cannot be read", runs.display()))?;
     for entry in entries {
         let path = entry.with_context(|| runs.display().to_string())?.path();
         if path.extension().is_some_and(|extension| extension == "csv") {
-            let text = std::fs::read_to_string(&path).with_context(|| path.display().to_string())?;
-            table.extend(from_csv(&text).with_context(|| path.display().to_string())?);
+            table.extend(read(&path)?);
         }
     }
     Ok(table)

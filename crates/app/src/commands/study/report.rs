@@ -1,15 +1,18 @@
 //! The study's outputs: one page of Markdown, plots, all raw rows as one CSV, and the numbers of the page as JSON.
 
+use std::path::Path;
+
 use anyhow::bail;
 use fovea_sampler::report::Mark;
 use serde_json::{Value, json};
 use tracer::gpu::Gpu;
 use tracer::provenance::Provenance;
 
-use super::analysis::{Analysis, Sight};
+use super::analysis::{Analysis, SUMMARY, Sight};
 use super::observer::Split;
 use super::plan::{Method, RING_EDGES_DEG};
 use super::plot::{self, Axis, Bars, Scale, Series};
+use super::record::ALL_RUNS;
 use super::tables;
 use crate::cli::study::{Part, StudyArgs};
 use crate::output::write_text;
@@ -24,7 +27,7 @@ const PROVENANCE: &str = "provenance.json";
 /// When the file cannot be written.
 pub fn write_provenance(args: &StudyArgs, gpu: &Gpu, part: Part) -> anyhow::Result<()> {
     let here: Value = Provenance::on(gpu).fields().into_iter().map(|(name, value)| (name, value.to_owned())).collect();
-    let mut all = read_provenance(args);
+    let mut all = read_provenance(&args.output);
     let name = if part == Part::Rates { "rates" } else { "curves" };
     let commands = with_command(all[name]["command"].as_str(), command());
     if part == Part::Rates || all[name].is_null() {
@@ -49,8 +52,8 @@ fn command() -> String {
     std::env::args().map(name).collect::<Vec<_>>().join(" ")
 }
 
-fn read_provenance(args: &StudyArgs) -> Value {
-    let text = std::fs::read_to_string(args.output.join(PROVENANCE)).ok();
+fn read_provenance(folder: &Path) -> Value {
+    let text = std::fs::read_to_string(folder.join(PROVENANCE)).ok();
     text.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_else(|| json!({}))
 }
 
@@ -63,9 +66,9 @@ pub fn write(args: &StudyArgs) -> anyhow::Result<()> {
     if args.only == Part::Report && analysis.scenes().is_empty() {
         bail!("{}: holds no study", args.output.display());
     }
-    let provenance = read_provenance(args);
-    write_text(&args.output.join("curves.csv"), &super::record::to_csv(&analysis.table))?;
-    write_text(&args.output.join("study.json"), &format!("{:#}\n", summary(&analysis, &provenance)))?;
+    let provenance = read_provenance(&args.output);
+    write_text(&args.output.join(ALL_RUNS), &super::record::to_csv(&analysis.table))?;
+    write_text(&args.output.join(SUMMARY), &format!("{:#}\n", summary(&analysis, &provenance)))?;
     write_text(&args.output.join("study.md"), &page(&analysis, &provenance))?;
     let caption = caption(&provenance);
     for scene in analysis.scenes() {
@@ -100,7 +103,7 @@ fn charts(analysis: &Analysis, sight: Sight<'_>, caption: &str) -> Vec<(&'static
             let inner = [0.0].into_iter().chain(RING_EDGES_DEG);
             let middles = inner.zip(RING_EDGES_DEG).map(|(a, b)| 0.5 * (a + b));
             let errors = tables::ring_errors(analysis, sight, method);
-            let points = middles.zip(errors).filter_map(|(middle, error)| Some([middle, error?])).collect();
+            let points = middles.zip(errors).filter_map(|(middle, error)| Some([middle, error?.value])).collect();
             Series { name: method.name().into(), mark: method.mark(), points }
         })
         .collect();
@@ -263,8 +266,21 @@ fn page(analysis: &Analysis, provenance: &Value) -> String {
 const TEMPLATE: &str = include_str!("page.md");
 
 #[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_page_in_the_documents_is_what_the_rows_beside_it_give() {
+        let reports = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/reports");
+        let folder = reports.join("study");
+        let made = page(&Analysis::read(&folder).unwrap(), &read_provenance(&folder));
+        let kept = std::fs::read_to_string(reports.join("study.md")).unwrap();
+        for (made, kept) in made.lines().zip(kept.lines()) {
+            assert_eq!(made, kept);
+        }
+        assert_eq!(made.len(), kept.len());
+    }
 
     #[test]
     fn commands_that_measured_are_kept_each_once() {

@@ -51,6 +51,12 @@ impl Curve {
         (0..self.samples.len()).map(mean).collect()
     }
 
+    /// Whether the curve has no point at so many samples or more.
+    pub fn ends_before(&self, samples: f64) -> bool {
+        // Samples of equal time are quotients, and may differ from the end's in the last digit.
+        self.samples.last().is_none_or(|last| last * (1.0 + 1e-9) < samples)
+    }
+
     /// Mean of all seeds at each point.
     pub fn mean(&self) -> Vec<f64> {
         self.mean_of(&self.every())
@@ -246,6 +252,7 @@ mod tests {
             assert!((at_samples(&curve, samples).unwrap() - expected).abs() < 1e-12);
         }
         assert_eq!(at_samples(&curve, 0.5), None);
+        assert_eq!([3.0, 4.0, 4.0 + 1e-12, 4.1].map(|samples| curve.ends_before(samples)), [false, false, false, true]);
         for (samples, expected) in [(0.5, 8.0), (2.0, 5.0), (4.0, 2.0), (40.0, 2.0)] {
             assert!((within_curve(&curve, samples).unwrap() - expected).abs() < 1e-12);
         }

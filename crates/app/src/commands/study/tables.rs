@@ -254,13 +254,38 @@ pub fn samples_in_equal_time(analysis: &Analysis, sight: Sight<'_>, method: Meth
     analysis.rates.in_equal_time((sight.scene, sight.gaze), (Method::Fv, end), method).ok()
 }
 
+/// A measure at a number of samples, and whether the curve ends before that.
+#[derive(Clone, Copy, Debug)]
+pub struct Found {
+    /// The measure.
+    pub value: f64,
+    is_beyond_the_end: bool,
+}
+
+impl Found {
+    fn times(self, factor: f64) -> Self {
+        Self { value: self.value * factor, ..self }
+    }
+}
+
+/// Three digits, with a star where the curve ends before, or a dash.
+fn starred(found: Option<Found>) -> String {
+    let star = if found.is_some_and(|found| found.is_beyond_the_end) { "*" } else { "" };
+    format!("{}{star}", short(found.map(|found| found.value)))
+}
+
+fn film_error_in_equal_time(analysis: &Analysis, sight: Sight<'_>, method: Method, measure: &str) -> Option<Found> {
+    let samples = samples_in_equal_time(analysis, sight, method)?;
+    let curve = analysis.curve(sight, method, measure)?;
+    let value = statistics::at_samples(&curve, samples)?;
+    Some(Found { value, is_beyond_the_end: curve.ends_before(samples) })
+}
+
 /// A method's film error by ring in the time that FV's curve takes.
-pub fn ring_errors(analysis: &Analysis, sight: Sight<'_>, method: Method) -> [Option<f64>; RING_COLUMNS.len()] {
-    let samples = samples_in_equal_time(analysis, sight, method);
+pub fn ring_errors(analysis: &Analysis, sight: Sight<'_>, method: Method) -> [Option<Found>; RING_COLUMNS.len()] {
     RING_COLUMNS.map(|measure| {
         let beyond_the_view = method == Method::Vp && measure == "film_r6";
-        let curve = analysis.curve(sight, method, measure).filter(|_| !beyond_the_view)?;
-        statistics::at_samples(&curve, samples?)
+        if beyond_the_view { None } else { film_error_in_equal_time(analysis, sight, method, measure) }
     })
 }
 
@@ -277,19 +302,16 @@ pub fn rings(analysis: &Analysis) -> String {
         let Some(sight) = analysis.sights(scene).first().copied() else { continue };
         for method in [Method::Od, Method::Vp, Method::Fv, Method::FvEq6] {
             let samples = samples_in_equal_time(analysis, sight, method);
-            let all = |measure: &str| {
-                let curve = analysis.curve(sight, method, measure)?;
-                statistics::at_samples(&curve, samples?)
-            };
+            let all = |measure: &str| starred(film_error_in_equal_time(analysis, sight, method, measure));
             // VP never reaches what lies outside its view: an error over the pixels that it has says nothing there.
-            let sphere = if method == Method::Vp { "never".into() } else { short(all("film_sphere")) };
+            let sphere = if method == Method::Vp { "never".into() } else { all("film_sphere") };
             let mut cells = vec![
                 scene.to_owned(),
                 method.name().to_owned(),
                 short(samples.map(|n| n / analysis.film_pixels(scene))),
             ];
-            cells.extend(ring_errors(analysis, sight, method).map(short));
-            cells.extend([short(all("film_view")), sphere]);
+            cells.extend(ring_errors(analysis, sight, method).map(starred));
+            cells.extend([all("film_view"), sphere]);
             table.row(&cells);
         }
     }
@@ -315,16 +337,20 @@ pub fn pictures(analysis: &Analysis) -> String {
         let end = od.samples.last().copied().unwrap_or(0.0) / 4.0;
         for method in [Method::Od, Method::Vp, Method::VpRegion, Method::Fv, Method::FvBest] {
             let samples = analysis.rates.in_equal_time((sight.scene, sight.gaze), (Method::Od, end), method).ok();
-            let at = |measure: &str| statistics::within_curve(&analysis.curve(sight, method, measure)?, samples?);
+            let at = |measure: &str| {
+                let (curve, samples) = (analysis.curve(sight, method, measure)?, samples?);
+                let value = statistics::within_curve(&curve, samples)?;
+                Some(Found { value, is_beyond_the_end: curve.ends_before(samples) })
+            };
             table.row(&[
                 scene.to_owned(),
                 method.name().to_owned(),
-                short(at("film_fovea")),
-                short(at("view_fovea")),
-                short(at("empty").map(|share| 100.0 * share)),
-                short(at("outline")),
-                short(at("colour")),
-                short(at("flip")),
+                starred(at("film_fovea")),
+                starred(at("view_fovea")),
+                starred(at("empty").map(|share| share.times(100.0))),
+                starred(at("outline")),
+                starred(at("colour")),
+                starred(at("flip")),
             ]);
         }
     }
