@@ -28,11 +28,31 @@ fn refresh(renderer: &mut Renderer, panorama: &mut Panorama, texels: u64) -> usi
 }
 
 fn eye(renderer: &mut Renderer, panorama: &Panorama, settings: &EyeSettings) -> Vec<[u8; 4]> {
+    eye_in(FORMAT, renderer, panorama, settings)
+}
+
+/// What a target of a format holds, byte for byte.
+fn eye_in(
+    format: wgpu::TextureFormat,
+    renderer: &mut Renderer,
+    panorama: &Panorama,
+    settings: &EyeSettings,
+) -> Vec<[u8; 4]> {
     let gpu = renderer.gpu().clone();
-    let texture = fovea_app::readback::picture_texture(&gpu, settings.size);
+    let [width, height] = settings.size;
+    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        label: Some("eye"),
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[],
+    });
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     let target = texture.create_view(&Default::default());
-    renderer.draw_eye(&mut encoder, panorama, settings, &target, FORMAT).unwrap();
+    renderer.draw_eye(&mut encoder, panorama, settings, &target, format).unwrap();
     gpu.queue.submit([encoder.finish()]);
     fovea_app::readback::read_texture(&gpu, &texture).unwrap()
 }
@@ -93,6 +113,29 @@ fn every_pixel_of_an_eye_shows_its_direction() {
     // One for rounding to 8 bits and half floats, two for the filter, which is three degrees wide at the picture's middle.
     assert!(largest < 3.0, "{largest} of 255");
     eprintln!("largest difference {largest:.2} of 255");
+}
+
+#[test]
+fn a_target_that_encodes_for_the_display_holds_what_one_that_does_not_is_given() {
+    let gpu = device::gpu();
+    let film = FilmOptions::equirect(512, 256);
+    // From black, so that both pieces of the display's curve are met.
+    let mut renderer = device::painted(&gpu, film, |d, _| Some((0.3 + 0.6 * d).max(Vec3::ZERO)));
+    let mut panorama = Panorama::new(&gpu, &film).unwrap();
+    refresh(&mut renderer, &mut panorama, u64::MAX);
+    let symmetric = Frustum::symmetric(1.2, 1.0);
+    let mut seen = 0;
+    for (pose, tone_map) in poses().into_iter().zip([ToneMap::Linear, ToneMap::AgX].into_iter().cycle()) {
+        let settings = EyeSettings { tone_map, ..settings(pose, symmetric) };
+        // The first choice of a headset's swapchain.
+        let encoding = eye_in(wgpu::TextureFormat::Rgba8UnormSrgb, &mut renderer, &panorama, &settings);
+        let plain = eye(&mut renderer, &panorama, &settings);
+        for (found, expected) in encoding.as_flattened().iter().zip(plain.as_flattened()) {
+            assert!(found.abs_diff(*expected) <= 1, "{found} instead of {expected}");
+        }
+        seen |= plain.iter().map(|texel| if texel[0] == 0 { 1 } else { 2 }).fold(0, std::ops::BitOr::bitor);
+    }
+    assert_eq!(seen, 3, "black and lighter pixels");
 }
 
 #[test]
