@@ -65,6 +65,21 @@ impl Core {
 }
 
 impl Piece {
+    /// The `u` at which the cells of a table meet; where its `u` ends is no matter here.
+    pub(crate) fn edges(&self) -> impl Iterator<Item = f64> {
+        let cells = match &self.core {
+            Core::Table { per_unit, first, cells } => Some((f64::from(*per_unit), *first, cells.len() as u32)),
+            Core::Polynomial(_) | Core::Rational { .. } => None,
+        };
+        let (origin, is_root) = (f64::from(self.origin), self.argument == Argument::SqrtU);
+        cells.into_iter().flat_map(move |(per_unit, first, count)| {
+            (first + 1..first + count).map(move |cell| {
+                let argument = f64::from(cell) / per_unit + origin;
+                if is_root { argument * argument } else { argument }
+            })
+        })
+    }
+
     /// The same piece of `scale` times its argument: takes a fit in `U = u scale` to `u`.
     pub(crate) fn rescaled(self, scale: f64) -> Self {
         let by_argument = if self.argument == Argument::SqrtU { scale.sqrt() } else { scale };

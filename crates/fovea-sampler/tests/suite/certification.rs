@@ -1,4 +1,5 @@
-//! Every bound that an inverse states, checked at all u = k 2^-24 against the exact quantile.
+//! Every bound that an inverse states: of the f32 evaluation at all u = k 2^-24 against the exact quantile, of density and CDF at
+//! points other than those that it was made from.
 
 use fovea_sampler::{Angle, ErrorReport, Form, Geometry, Inverse, RadialDistribution, Reddy2001};
 
@@ -37,7 +38,7 @@ fn forms_of_reddys_acuity_meet_their_claims() {
         (Plane, Form::Polynomial(7), 8.3e-6, 4e-4),
         (Plane, Form::Polynomial(8), 3.3e-6, 1.8e-4),
         (Plane, Form::Rational(4, 3), 5.8e-7, 1.6e-4),
-        (Plane, Form::Table(64), 1.7e-7, 1.6e-4),
+        (Plane, Form::Table(64), 1.7e-7, 1.5e-6),
     ];
     for (geometry, form, relative_e, density) in claims {
         let distribution = reddy(geometry, 0.0);
