@@ -106,6 +106,10 @@ fn warps() -> Vec<(String, GazeWarp)> {
                 all.push((name, GazeWarp::new(RadialDistribution::new(model, geometry, cap, floor).unwrap())));
             }
         }
+        // Up to the antipode, where a fit's error would go on.
+        let whole = RadialDistribution::new(Reddy2001, geometry, Angle::from_degrees(180.0), 0.0).unwrap();
+        let inverse = Inverse::with_form(&whole, Form::Rational(3, 3)).unwrap();
+        all.push((format!("reddy {geometry:?} cap 180"), GazeWarp::with_inverse(whole, inverse)));
         let distribution = RadialDistribution::new(Reddy2001, geometry, cap, 0.002).unwrap();
         for form in [
             Form::Eq6,

@@ -9,6 +9,9 @@ use crate::{Angle, Geometry, RadialDistribution, SamplerError, trig};
 pub use certify::{ErrorBound, ErrorReport};
 pub(crate) use form::{Argument, Core, Outer, Piece};
 
+/// The largest f32 that is at most pi, which f32's own exceeds.
+const LARGEST_ANGLE: f32 = 3.141_592_5;
+
 /// The largest relative error in eccentricity, in f32 arithmetic, that a fit may have.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub struct MaxRelativeError(pub f64);
@@ -41,13 +44,16 @@ pub struct Inverse {
     geometry: Geometry,
     pieces: Vec<Piece>,
     tail: Option<Tail>,
+    /// Where a fit's error may reach beyond the antipode, the largest radius there is.
+    limit: Option<f32>,
     bound: ErrorBound,
 }
 
 impl Inverse {
     /// The inverse to use when nothing is asked for: on the sphere the cheapest form within 2e-5 relative error in e (for
     /// Reddy's acuity a rational 3/3), on the plane a polynomial of degree 5 (4e-5 for Reddy's: the cost of Eq. 6). Where the
-    /// model does not admit it, the best form on offer.
+    /// model does not admit it, the best form on offer that rises; if none does, the finest table, the bound of whose density is then
+    /// infinite.
     #[must_use]
     pub fn default_for(distribution: &RadialDistribution) -> Self {
         build::default_for(distribution)
@@ -93,7 +99,7 @@ impl Inverse {
         self.geometry
     }
 
-    /// What its error is, in which measure and over which domain; the tests certify it over all `u = k 2^-24`.
+    /// What its error is, in which measure and over which domain.
     #[must_use]
     pub fn bound(&self) -> &ErrorBound {
         &self.bound
@@ -107,6 +113,10 @@ impl Inverse {
         self.tail
     }
 
+    pub(crate) fn limit(&self) -> Option<f32> {
+        self.limit
+    }
+
     /// The radius at `u`: `v = 1 - cos e` in `[0, 2]` on the sphere, `e` in radians on the plane.
     #[inline]
     #[must_use]
@@ -114,7 +124,7 @@ impl Inverse {
         let u = unit_interval(u);
         match (self.tail_versine(u), self.geometry) {
             (Some(v), Geometry::Sphere) => v,
-            (Some(v), Geometry::Plane) => Angle::from_versine(f64::from(v)).radians() as f32,
+            (Some(v), Geometry::Plane) => (Angle::from_versine(f64::from(v)).radians() as f32).min(LARGEST_ANGLE),
             (None, _) => self.eval_capped(u),
         }
     }
@@ -141,6 +151,9 @@ impl Inverse {
                 *radius = if *u <= piece.end { value } else { *radius };
             }
         }
+        if let Some(limit) = self.limit {
+            radius = lanes::map(&radius, |x| x.min(limit));
+        }
         let versine = match self.geometry {
             Geometry::Sphere => radius,
             Geometry::Plane => lanes::map(&radius, trig::versine),
@@ -161,11 +174,13 @@ impl Inverse {
     #[inline]
     fn eval_capped(&self, u: f32) -> f32 {
         let (last, others) = self.pieces.split_last().expect("an inverse has at least one piece");
-        others.iter().find(|piece| u <= piece.end).unwrap_or(last).eval(u)
+        let radius = others.iter().find(|piece| u <= piece.end).unwrap_or(last).eval(u);
+        self.limit.map_or(radius, |limit| radius.min(limit))
     }
 
     /// The radius and its derivative by `u` in f64, with the f32 coefficients: the map that the shader computes but for its
-    /// rounding. Radius as in [`Self::eval`].
+    /// rounding. Radius as in [`Self::eval`]. Where a fit's error reaches beyond the antipode the radius is the antipode's and the
+    /// derivative the fit's.
     #[must_use]
     pub fn eval_f64(&self, u: f64) -> (f64, f64) {
         let u = if u > 0.0 { u.min(1.0) } else { 0.0 };
@@ -180,7 +195,8 @@ impl Inverse {
             };
         }
         let (last, others) = self.pieces.split_last().expect("an inverse has at least one piece");
-        others.iter().find(|piece| u <= f64::from(piece.end)).unwrap_or(last).eval_f64(u)
+        let (radius, slope) = others.iter().find(|piece| u <= f64::from(piece.end)).unwrap_or(last).eval_f64(u);
+        (self.limit.map_or(radius, |limit| radius.min(limit.into())), slope)
     }
 
     /// The eccentricity at `u`, from the f32 evaluation.

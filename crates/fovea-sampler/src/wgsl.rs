@@ -76,6 +76,10 @@ fn warp_radius(inverse: &Inverse) -> String {
         for statement in statements {
             let _ = writeln!(text, "{indent}{statement}");
         }
+        let value = match inverse.limit() {
+            Some(limit) => format!("min({value}, {})", literal(limit)),
+            None => value,
+        };
         let value = if plane { format!("warp_versine({value})") } else { value };
         let _ = writeln!(text, "{indent}return {value};");
         if index < last {

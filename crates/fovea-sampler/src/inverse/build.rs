@@ -1,12 +1,12 @@
 //! Building inverses: fits a form to the exact quantile and joins the pieces.
 
 use super::certify::{ErrorBound, measure};
-use super::{Argument, Core, Form, Inverse, MaxRelativeError, Outer, Piece, Tail};
+use super::{Argument, Core, Form, Inverse, LARGEST_ANGLE, MaxRelativeError, Outer, Piece, Tail};
 use crate::fit::{Minimax, Problem, minimax};
 use crate::truth::Truth;
 use crate::{Angle, Geometry, RadialDistribution, SamplerError};
 
-/// Points at which a new inverse's error is measured; the tests measure all 2^24.
+/// Points at which a new inverse's error is measured; the tests measure at others too ([`ErrorBound`]).
 const MEASURE_POINTS: u32 = 1 << 14;
 /// Beyond this eccentricity `1 - cos e` does not determine the angle to f32's accuracy; fits weigh it as here.
 const LEAST_SINE: f64 = 0.5;
@@ -45,17 +45,26 @@ pub(super) fn default_for(distribution: &RadialDistribution) -> Inverse {
         Geometry::Sphere => 2e-5,
         Geometry::Plane => 4e-5,
     };
-    search(distribution, &truth, accuracy).unwrap_or_else(|best| *best)
+    search(distribution, &truth, accuracy).unwrap_or_else(|best| match best {
+        Some(best) => *best,
+        None => {
+            let form = Form::Table(4096);
+            let fitted = Fitted::new(distribution, &truth, form).expect("a table is made of values, not fitted");
+            assemble(distribution, &truth, form, fitted)
+        }
+    })
 }
 
 pub(super) fn fit(distribution: &RadialDistribution, accuracy: MaxRelativeError) -> Result<Inverse, SamplerError> {
     let truth = Truth::new(distribution);
-    search(distribution, &truth, accuracy.0)
-        .map_err(|best| SamplerError::Accuracy { requested: accuracy.0, best: best.bound.relative_e })
+    search(distribution, &truth, accuracy.0).map_err(|best| match best {
+        Some(best) => SamplerError::Accuracy { requested: accuracy.0, best: best.bound.relative_e },
+        None => SamplerError::Unsupported("no form on offer is monotone for this distribution"),
+    })
 }
 
-/// The first candidate within `accuracy`, or else the best of all.
-fn search(distribution: &RadialDistribution, truth: &Truth, accuracy: f64) -> Result<Inverse, Box<Inverse>> {
+/// The first candidate within `accuracy`, or else the best of those that rise, if one does.
+fn search(distribution: &RadialDistribution, truth: &Truth, accuracy: f64) -> Result<Inverse, Option<Box<Inverse>>> {
     let mut best: Option<Inverse> = None;
     // What an exact-arithmetic fit misses, f32 will not find: the first pass does not even measure it.
     for skip_hopeless in [true, false] {
@@ -79,7 +88,7 @@ fn search(distribution: &RadialDistribution, truth: &Truth, accuracy: f64) -> Re
             }
         }
     }
-    Err(Box::new(best.expect("a table exists for every distribution")))
+    Err(best.map(Box::new))
 }
 
 pub(super) fn with_form(distribution: &RadialDistribution, form: Form) -> Result<Inverse, SamplerError> {
@@ -400,6 +409,20 @@ fn round_down(x: f64) -> f32 {
     if f64::from(nearest) > x { nearest.next_down() } else { nearest }
 }
 
+/// The radius of the antipode, where the map comes so near to it that it may reach beyond.
+fn limit(inverse: &Inverse) -> Option<f32> {
+    /// Of the radius: more than what the fits' errors change between the points that are looked at.
+    const MARGIN: f64 = 1e-2;
+    let antipode = match inverse.geometry() {
+        Geometry::Sphere => 2.0,
+        Geometry::Plane => LARGEST_ANGLE,
+    };
+    let within_cap = inverse.share_within_cap() / f64::from(MEASURE_POINTS);
+    let radius = |k: u32| inverse.eval_f64(f64::from(k) * within_cap).0;
+    let reaches = (0..=MEASURE_POINTS).any(|k| radius(k) > f64::from(antipode) * (1.0 - MARGIN));
+    reaches.then_some(antipode)
+}
+
 /// Adds the part beyond the cap and measures the whole.
 fn finish(distribution: &RadialDistribution, name: String, pieces: Vec<Piece>) -> Inverse {
     let geometry = distribution.geometry();
@@ -412,7 +435,8 @@ fn finish(distribution: &RadialDistribution, name: String, pieces: Vec<Piece>) -
         let versine = if geometry == Geometry::Sphere { at_cap } else { Angle::from_radians(at_cap).versine() };
         Tail { joint, start: round_down(joint), slope: ((2.0 - versine) / (1.0 - joint)) as f32 }
     });
-    let mut inverse = Inverse { name, geometry, pieces, tail, bound: ErrorBound::UNKNOWN };
+    let mut inverse = Inverse { name, geometry, pieces, tail, limit: None, bound: ErrorBound::UNKNOWN };
+    inverse.limit = limit(&inverse);
     inverse.bound = measure(&inverse, distribution, MEASURE_POINTS).bound();
     inverse
 }

@@ -7,12 +7,17 @@ pub(crate) const SIGNIFICANCE: f64 = 1e-3;
 
 /// Every built-in model in both geometries, with and without a floor, at a cap of 80 degrees.
 pub(crate) fn distributions() -> Vec<(String, RadialDistribution)> {
+    distributions_to(80.0)
+}
+
+/// The same at another cap.
+pub(crate) fn distributions_to(cap_deg: f64) -> Vec<(String, RadialDistribution)> {
     let mut all = Vec::new();
     for geometry in Geometry::ALL {
         for floor in [0.0, 0.002] {
             for model in model::built_in() {
-                let name = format!("{} {geometry:?} floor {floor}", model.name());
-                let cap = Angle::from_degrees(80.0);
+                let name = format!("{} {geometry:?} floor {floor} cap {cap_deg}", model.name());
+                let cap = Angle::from_degrees(cap_deg);
                 all.push((name, RadialDistribution::new(model, geometry, cap, floor).expect("valid constants")));
             }
         }
