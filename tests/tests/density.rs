@@ -244,6 +244,43 @@ fn a_layer_without_its_floor_ends_at_the_cap() {
     assert!(inside > 1000.0 && beyond == 0.0, "{inside} samples at 70 to 78 degrees, {beyond} beyond 83");
 }
 
+/// Lists of pixels that random numbers or the device do not reach are refused when they are to be used; the film goes on without.
+#[test]
+fn lists_of_pixels_that_do_not_fit_are_refused() {
+    const LONGEST: usize = 1 << 24;
+    let gpu = device::gpu();
+    let options = RendererOptions { film: FilmOptions::equirect(64, 32), max_bounces: 0, ..Default::default() };
+    let mut renderer = Renderer::new(&gpu, &options, Distribution::omnidirectional(device::inverse())).unwrap();
+    renderer.set_scene(&scenes::empty(Vec3::ONE)).unwrap();
+    let list: Arc<[u32]> = vec![7; LONGEST].into();
+    let mut trace = |lists: Vec<Arc<[u32]>>| {
+        let layers = lists.into_iter().map(|list| (1.0, Layer::Pixels(list))).collect();
+        renderer.set_distribution(Distribution::mixture(layers, device::inverse()).unwrap()).unwrap();
+        renderer.trace(1 << 10).map_err(|error| error.to_string())
+    };
+    let error = trace(vec![vec![7; LONGEST + 1].into()]).unwrap_err();
+    assert!(error.contains("16777217") && error.contains("16777216"), "{error}");
+    trace(vec![Arc::clone(&list)]).unwrap();
+    // Layers are few, and adapters may bind more than all of them.
+    let too_many = (gpu.largest_binding() / (4 * LONGEST as u64) + 1) as usize;
+    if too_many <= 8 {
+        let error = trace(vec![list; too_many]).unwrap_err();
+        assert!(error.contains(&gpu.largest_binding().to_string()), "{error}");
+    }
+    trace(vec![vec![7].into()]).unwrap();
+}
+
+/// A view smaller than a pixel has the one in its middle.
+#[test]
+fn a_region_between_pixel_centres_is_one_pixel() {
+    let film = FilmOptions::equirect(64, 32);
+    let view = View::new(Quat::from_rotation_y(-1.0), 1e-3, 1e-3);
+    let region = Distribution::region(view, &film, Quat::IDENTITY, device::inverse());
+    let [(_, Layer::Pixels(list))] = region.layers() else { panic!("{region:?}") };
+    let [x, y] = film.pixel_of(view.direction(Vec2::ZERO)).unwrap();
+    assert_eq!(**list, [y * film.width + x]);
+}
+
 /// A clip keeps samples in its view, where they follow the model as without one; those that ignore it have their share everywhere.
 #[test]
 fn a_clip_keeps_samples_in_its_view() {

@@ -6,6 +6,7 @@
 use std::sync::Arc;
 
 use glam::{Quat, Vec2, Vec3};
+use rayon::prelude::*;
 use tracer::distribution::{Distribution, Layer, View, film_direction};
 use tracer::film::{FilmMapping, FilmOptions};
 
@@ -13,6 +14,10 @@ use tracer::film::{FilmMapping, FilmOptions};
 pub const PIN_RADIUS: f32 = 0.05;
 /// A brush is softer towards its rim: so many discs, one in the other, each a step of density.
 const BRUSH_STEPS: u8 = 3;
+/// So often is a pixel listed at most, however many spots lie on it: as often as under the middle of four.
+const MOST_TIMES: u8 = 4 * BRUSH_STEPS;
+/// Longer lists, which are copied whenever the gaze moves, list pixels less often, in proportion; each at least once.
+const LONG_LIST: usize = 1 << 22;
 
 /// A disc of directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,28 +84,23 @@ impl Attention {
         self.region.is_none() && self.painted.is_empty() && self.pins.is_empty()
     }
 
-    /// The film's pixels of each tool that is used.
-    pub fn lists(&self, film: &FilmOptions, world_from_film: Quat) -> Vec<Arc<[u32]>> {
-        let film_from_world = world_from_film.inverse();
-        let in_film = |spot: &Spot| Spot { direction: film_from_world * spot.direction, ..*spot };
+    /// The film's pixels of each tool that is used. `painted` is what was made of the painted spots the last time: only what was
+    /// painted since is added, unless the film is another.
+    pub fn lists(&self, film: &FilmOptions, world_from_film: Quat, painted: &mut Cover) -> Vec<Arc<[u32]>> {
         let region = self.region.iter().map(|region| {
-            let mut pixels = Vec::new();
-            spot_pixels(film, in_film(&region.around()), &mut pixels);
+            let mut cover = Cover::of(film, world_from_film);
+            cover.add(&[region.around()], 1);
+            let mut pixels = cover.list();
             let direction =
                 |index: &u32| world_from_film * film_direction(film, index % film.width, index / film.width);
             pixels.retain(|index| region.contains(direction(index)));
             pixels
         });
-        let spots = |spots: &[Spot]| {
-            let mut pixels = Vec::new();
-            for (spot, step) in spots.iter().flat_map(|spot| (1..=BRUSH_STEPS).map(move |step| (spot, step))) {
-                let radius = spot.radius * f32::from(step) / f32::from(BRUSH_STEPS);
-                spot_pixels(film, Spot { radius, ..in_film(spot) }, &mut pixels);
-            }
-            pixels
-        };
-        let pins: Vec<Spot> = self.pins.iter().map(|pin| Spot { direction: *pin, radius: PIN_RADIUS }).collect();
-        let lists = region.chain([spots(&self.painted), spots(&pins)]);
+        painted.follow(film, world_from_film, &self.painted);
+        let spots: Vec<Spot> = self.pins.iter().map(|pin| Spot { direction: *pin, radius: PIN_RADIUS }).collect();
+        let mut pins = Cover::default();
+        pins.follow(film, world_from_film, &spots);
+        let lists = region.chain([painted.list(), pins.list()]);
         lists.filter(|pixels| !pixels.is_empty()).map(Into::into).collect()
     }
 
@@ -119,44 +119,123 @@ impl Attention {
     }
 }
 
-/// Adds the pixels whose centre lies in a disc about a direction of the film's frame; at least the one in its middle.
-fn spot_pixels(film: &FilmOptions, spot: Spot, pixels: &mut Vec<u32>) {
-    let before = pixels.len();
-    let cos_radius = spot.radius.cos();
+/// How often spots list each pixel of a film.
+#[derive(Debug, Default)]
+pub struct Cover {
+    film: Option<(FilmOptions, Quat)>,
+    spots: Vec<Spot>,
+    /// By pixel, at most [`MOST_TIMES`]; empty without spots.
+    times: Vec<u8>,
+}
+
+impl Cover {
+    fn of(film: &FilmOptions, world_from_film: Quat) -> Self {
+        Self { film: Some((*film, world_from_film)), ..Self::default() }
+    }
+
+    /// Brings it in line with soft spots; those that it has already are not looked at again.
+    fn follow(&mut self, film: &FilmOptions, world_from_film: Quat, spots: &[Spot]) {
+        if self.film != Some((*film, world_from_film)) || !spots.starts_with(&self.spots) {
+            *self = Self::of(film, world_from_film);
+        }
+        let new = &spots[self.spots.len()..];
+        self.add(new, BRUSH_STEPS);
+        self.spots.extend_from_slice(new);
+    }
+
+    /// Counts the pixels whose centre lies in a spot, and the one in its middle, once for each of so many discs in one another.
+    fn add(&mut self, spots: &[Spot], steps: u8) {
+        let Some((film, world_from_film)) = self.film.filter(|_| !spots.is_empty()) else { return };
+        let film_from_world = world_from_film.inverse();
+        let discs: Vec<Disc> = spots
+            .iter()
+            .flat_map(|spot| (1..=steps).map(move |step| (spot, f32::from(step) / f32::from(steps))))
+            .map(|(spot, part)| Disc::new(&film, film_from_world * spot.direction, spot.radius * part))
+            .collect();
+        self.times.resize(film.pixels() as usize, 0);
+        let rows = self.times.par_chunks_mut(film.width as usize);
+        rows.zip(0..film.height).for_each(|(times, y)| count_row(&film, &discs, y, times));
+    }
+
+    /// The pixels, each as often as it was counted. In a long list they are fewer times in it, in proportion.
+    fn list(&self) -> Vec<u32> {
+        let pixels = self.times.iter().filter(|times| **times > 0).count();
+        let whole: usize = self.times.iter().map(|times| usize::from(*times)).sum();
+        // Each pixel's number is rounded up, which adds less than one.
+        let part = (LONG_LIST.saturating_sub(pixels) as f64 / whole.max(1) as f64).min(1.0);
+        let listed = |times: u8| (f64::from(times) * part).ceil().max(f64::from(times.min(1))) as usize;
+        let table: [usize; MOST_TIMES as usize + 1] = std::array::from_fn(|times| listed(times as u8));
+        let mut list = Vec::with_capacity(whole.min(LONG_LIST.max(pixels)));
+        for (pixel, times) in (0..).zip(&self.times) {
+            list.extend(std::iter::repeat_n(pixel, table[usize::from(*times)]));
+        }
+        list
+    }
+}
+
+/// A disc of a film's directions.
+struct Disc {
+    /// Of the film's frame.
+    direction: Vec3,
+    cos_radius: f32,
+    /// The pixel that its middle lies in, where the film has it.
+    middle: Option<[u32; 2]>,
+}
+
+impl Disc {
+    fn new(film: &FilmOptions, direction: Vec3, radius: f32) -> Self {
+        Self { direction, cos_radius: radius.min(std::f32::consts::PI).cos(), middle: film.pixel_of(direction) }
+    }
+
+    /// Columns of a row of a panorama, the first of which may be negative: whole turns are left out of account.
+    fn columns(&self, film: &FilmOptions, y: u32) -> std::ops::RangeInclusive<i64> {
+        #[expect(clippy::reversed_empty_ranges, reason = "none")]
+        const NONE: std::ops::RangeInclusive<i64> = 0..=-1;
+        let latitude = self.direction.y.clamp(-1.0, 1.0).asin();
+        let longitude = self.direction.x.atan2(-self.direction.z);
+        let row_latitude = std::f32::consts::PI * (0.5 - (y as f32 + 0.5) / film.height as f32);
+        let (sin, cos) = row_latitude.sin_cos();
+        // cos radius = sin sin + cos cos cos(difference of longitude)
+        let cos_half = (self.cos_radius - sin * self.direction.y) / (cos * latitude.cos()).max(1e-12);
+        if cos_half > 1.0 {
+            return NONE;
+        }
+        let half = cos_half.max(-1.0).acos() / std::f32::consts::TAU * film.width as f32;
+        let centre = (0.5 + longitude / std::f32::consts::TAU) * film.width as f32 - 0.5;
+        let start = (centre - half).ceil() as i64;
+        start..=((centre + half).floor() as i64).min(start + i64::from(film.width) - 1)
+    }
+}
+
+/// Counts a row's pixels whose centre lies in discs.
+fn count_row(film: &FilmOptions, discs: &[Disc], y: u32, times: &mut [u8]) {
+    let count = |times: &mut u8| *times = (*times + 1).min(MOST_TIMES);
+    let is_middle = |disc: &Disc, x: u32| disc.middle == Some([x, y]);
     match film.mapping {
         FilmMapping::Perspective { .. } => {
-            let inside = |index: &u32| {
-                film_direction(film, index % film.width, index / film.width).dot(spot.direction) >= cos_radius
-            };
-            pixels.extend((0..film.pixels() as u32).filter(inside));
-        }
-        FilmMapping::Equirect => {
-            let latitude = spot.direction.y.clamp(-1.0, 1.0).asin();
-            let longitude = spot.direction.x.atan2(-spot.direction.z);
-            let row = |latitude: f32| (0.5 - latitude / std::f32::consts::PI) * film.height as f32;
-            let first = row(latitude + spot.radius).floor().max(0.0) as u32;
-            let last = row(latitude - spot.radius).ceil().min(film.height as f32) as u32;
-            for y in first..last {
-                let row_latitude = std::f32::consts::PI * (0.5 - (y as f32 + 0.5) / film.height as f32);
-                let (sin, cos) = row_latitude.sin_cos();
-                // cos radius = sin sin + cos cos cos(difference of longitude)
-                let cos_half = (cos_radius - sin * spot.direction.y) / (cos * latitude.cos()).max(1e-12);
-                if cos_half > 1.0 {
-                    continue;
+            for (x, times) in (0..).zip(times) {
+                let direction = film_direction(film, x, y);
+                for disc in discs {
+                    if *times == MOST_TIMES {
+                        break;
+                    }
+                    if direction.dot(disc.direction) >= disc.cos_radius || is_middle(disc, x) {
+                        count(times);
+                    }
                 }
-                let half = cos_half.max(-1.0).acos() / std::f32::consts::TAU * film.width as f32;
-                let centre = (0.5 + longitude / std::f32::consts::TAU) * film.width as f32 - 0.5;
-                let start = (centre - half).ceil() as i64;
-                let end = ((centre + half).floor() as i64).min(start + i64::from(film.width) - 1);
-                let column = |x: i64| x.rem_euclid(i64::from(film.width)) as u32;
-                pixels.extend((start..=end).map(|x| y * film.width + column(x)));
             }
         }
-    }
-    if pixels.len() == before
-        && let Some([x, y]) = film.pixel_of(spot.direction)
-    {
-        pixels.push(y * film.width + x);
+        FilmMapping::Equirect => {
+            for disc in discs {
+                let columns = disc.columns(film, y);
+                let column = |x: i64| x.rem_euclid(i64::from(film.width)) as u32;
+                let middle = disc.middle.filter(|[_, row]| *row == y).map(|[x, _]| x);
+                let beside = middle.filter(|middle| !columns.clone().any(|x| column(x) == *middle));
+                for x in columns.map(column).chain(beside) {
+                    count(&mut times[x as usize]);
+                }
+            }
+        }
     }
 }
 
@@ -181,8 +260,9 @@ mod tests {
             {
                 let direction = Vec3::new(x, y, z).normalize();
                 for radius in [0.02, 0.3, 1.4] {
-                    let mut pixels = Vec::new();
-                    spot_pixels(&film, Spot { direction, radius }, &mut pixels);
+                    let mut cover = Cover::of(&film, Quat::IDENTITY);
+                    cover.add(&[Spot { direction, radius }], 1);
+                    let pixels = cover.list();
                     let found: BTreeSet<u32> = pixels.iter().copied().collect();
                     assert_eq!(found.len(), pixels.len(), "each pixel once");
                     let sure = |margin: f32| brute(&film, |d| d.angle_between(direction) <= radius + margin);
@@ -201,7 +281,7 @@ mod tests {
         let view = View::new(Quat::from_rotation_y(3.0) * Quat::from_rotation_x(0.4), 1.4, 0.9);
         let region = Rectangle { view, corners: [Vec2::new(0.8, -0.5), Vec2::new(-0.2, 0.7)] };
         let attention = Attention { region: Some(region), ..Attention::default() };
-        let found: BTreeSet<u32> = attention.lists(&film, turn)[0].iter().copied().collect();
+        let found: BTreeSet<u32> = attention.lists(&film, turn, &mut Cover::default())[0].iter().copied().collect();
         assert_eq!(found, brute(&film, |d| region.contains(turn * d)));
         assert!(found.len() > 100);
     }
@@ -214,7 +294,7 @@ mod tests {
         let spot = Spot { direction: Vec3::X, radius: 0.3 };
         let attention =
             Attention { painted: vec![spot], pins: vec![Vec3::Z, Vec3::Y], share: 0.5, ..Default::default() };
-        let lists = attention.lists(&film, Quat::IDENTITY);
+        let lists = attention.lists(&film, Quat::IDENTITY, &mut Cover::default());
         assert_eq!(lists.len(), 2);
         let mixed = attention.mixed(Distribution::omnidirectional(Arc::clone(&inverse)), &lists);
         let weights: Vec<f32> = mixed.layers().iter().map(|(weight, _)| *weight).collect();
@@ -223,7 +303,34 @@ mod tests {
         let middle = film.pixel_of(Vec3::X).map(|[x, y]| y * film.width + x).unwrap();
         assert_eq!(lists[0].iter().filter(|index| **index == middle).count(), usize::from(BRUSH_STEPS));
         let none = Attention::default();
-        let plain = none.mixed(Distribution::omnidirectional(inverse), &none.lists(&film, Quat::IDENTITY));
+        let plain = none
+            .mixed(Distribution::omnidirectional(inverse), &none.lists(&film, Quat::IDENTITY, &mut Cover::default()));
         assert_eq!(plain.layers().len(), 1);
+    }
+
+    /// Spots over spots, at the pole of the window's own film, where a disc has most pixels: the list stays within a bound, and what
+    /// was painted step by step is what was painted at once.
+    #[test]
+    fn painting_goes_on_for_long() {
+        let film = FilmOptions::equirect(4096, 2048);
+        let direction = |dab: u16| Quat::from_rotation_x(f32::from(dab) * 5e-5) * Vec3::Y;
+        let spot = |dab| Spot { direction: direction(dab), radius: 20f32.to_radians() };
+        let (mut attention, mut cover) = (Attention::default(), Cover::default());
+        for dabs in [1, 45, 400] {
+            attention.painted = (0..dabs).map(spot).collect();
+            let list = attention.lists(&film, Quat::IDENTITY, &mut cover).remove(0);
+            assert!(list.len() <= LONG_LIST, "{dabs}: {}", list.len());
+            let whole = attention.lists(&film, Quat::IDENTITY, &mut Cover::default());
+            assert_eq!(*list, *whole[0], "{dabs}");
+            // Every pixel of the disc, and those in the middle more often than those at the rim, until that is full too.
+            let times = |row: u32| list.iter().filter(|listed| **listed == row * film.width).count();
+            assert!(times(220) > 0 && times(0) >= times(220), "{dabs}");
+            assert!(dabs > 1 || times(0) > times(220));
+        }
+        // Where all of a film is painted, each pixel stays in the list.
+        attention.painted = vec![Spot { direction: Vec3::Y, radius: 4.0 }];
+        let list = attention.lists(&film, Quat::IDENTITY, &mut cover).remove(0);
+        assert_eq!(list.iter().collect::<BTreeSet<_>>().len() as u64, film.pixels());
+        assert_eq!(list.len() as u64, film.pixels());
     }
 }

@@ -156,7 +156,8 @@ impl Distribution {
         Self { layers: vec![(1.0, Layer::ImagePlane(view))], inverse }
     }
 
-    /// Uniform over the film pixels whose centre is inside a view, as a rectangle-selection tool does.
+    /// Uniform over the film pixels whose centre is inside a view, as a rectangle-selection tool does; over the one in its middle
+    /// where none is, and over the film where that shows nothing of the view.
     pub fn region(view: View, film: &FilmOptions, world_from_film: Quat, inverse: Arc<Inverse>) -> Self {
         Self { layers: vec![(1.0, Layer::Pixels(pixels_in_view(film, world_from_film, &view)))], inverse }
     }
@@ -456,14 +457,20 @@ pub fn gaze_frame(n: Vec3) -> Mat3 {
     )
 }
 
-/// Film pixels whose centre is inside a view; all pixels when none is.
+/// Film pixels whose centre is inside a view; when none is, that in its middle, or all where the film shows nothing of it.
 fn pixels_in_view(film: &FilmOptions, world_from_film: Quat, view: &View) -> Arc<[u32]> {
     let inside = |index: u32| {
         let d = world_from_film * film_direction(film, index % film.width, index / film.width);
         view.project(d).is_some_and(|p| p.abs().max_element() <= 1.0)
     };
     let list: Vec<u32> = (0..film.pixels() as u32).into_par_iter().filter(|&index| inside(index)).collect();
-    if list.is_empty() { (0..film.pixels() as u32).collect() } else { list.into() }
+    if !list.is_empty() {
+        return list.into();
+    }
+    match film.pixel_of(world_from_film.inverse() * view.direction(Vec2::ZERO)) {
+        Some([x, y]) => Arc::new([y * film.width + x]),
+        None => (0..film.pixels() as u32).collect(),
+    }
 }
 
 /// Direction, in the film's frame, of a pixel's centre.

@@ -102,6 +102,26 @@ pub enum RenderError {
         /// Its name.
         adapter: String,
     },
+    /// A distribution over a list of film pixels has more of them than random numbers tell apart.
+    #[error(
+        "samples cannot be spread over a list of {pixels} film pixels, {limit} is the most: choose a smaller part of the film"
+    )]
+    PixelListTooLong {
+        /// Of the list.
+        pixels: u64,
+        /// The longest list.
+        limit: u64,
+    },
+    /// A distribution's lists of film pixels are more than the device can bind at once.
+    #[error("lists of film pixels bind {bytes} bytes, and adapter {adapter} at most {limit}")]
+    PixelListsTooLarge {
+        /// Of all lists.
+        bytes: u64,
+        /// What the adapter allows.
+        limit: u64,
+        /// Its name.
+        adapter: String,
+    },
     /// Tracing was asked for before a scene was set.
     #[error("no scene to trace")]
     NoScene,
@@ -423,7 +443,7 @@ impl Renderer {
     /// any such size, the next at most as many as are done already, and so on.
     ///
     /// # Errors
-    /// When there is no scene, or the device is lost while it is waited for.
+    /// When there is no scene, a distribution's pixel lists do not fit the device, or it is lost while it is waited for.
     pub fn trace(&mut self, samples: u32) -> Result<u32, RenderError> {
         self.follow_noise()?;
         let samples = self.next_batch(samples);
@@ -446,7 +466,7 @@ impl Renderer {
     /// returns false to stop early. Returns the seconds of tracing.
     ///
     /// # Errors
-    /// When there is no scene or the device is lost.
+    /// As [`Renderer::trace`].
     pub fn render(&mut self, stop: StopCondition, mut progress: impl FnMut(f64) -> bool) -> Result<f64, RenderError> {
         let target = 0.1;
         let started = Instant::now();

@@ -14,7 +14,7 @@ use tracer::scene::Scene;
 use tracer::view::{ViewProjection, ViewSettings};
 
 use super::engine::{Look, Picture};
-use crate::attention::Attention;
+use crate::attention::{Attention, Cover};
 use crate::cli::PreviewArgs;
 use crate::cli::choices::{EccentricityAt, Mode};
 use crate::convergence::{AROUND_RADIUS_PX, Block};
@@ -88,6 +88,7 @@ pub struct Tracing {
     aim: Option<Aim>,
     /// What the lists below were made for.
     attention: Option<(Attention, FilmPlan)>,
+    painted: Cover,
     wanted_pixels: Vec<Arc<[u32]>>,
     view: Option<View>,
     traced: Duration,
@@ -116,6 +117,7 @@ impl Tracing {
             inverse: None,
             aim: None,
             attention: None,
+            painted: Cover::default(),
             wanted_pixels: Vec::new(),
             view: None,
             traced: Duration::ZERO,
@@ -305,7 +307,7 @@ impl Tracing {
         }
         let wants = self.attention.as_ref().is_none_or(|(last, of)| last != attention || *of != plan);
         if wants {
-            self.wanted_pixels = attention.lists(&plan.options, plan.world_from_film);
+            self.wanted_pixels = attention.lists(&plan.options, plan.world_from_film, &mut self.painted);
             self.attention = Some((attention.clone(), plan));
         }
         let aims = self.aim.is_none_or(|last| last.differs(&aim));

@@ -64,7 +64,7 @@ impl Renderer {
         let film = &self.options.film;
         let rows = guide::rows(self.distribution.peak_share(film));
         let columns = rows * GUIDE_COLUMNS_PER_ROW;
-        self.prepare_sampling(true);
+        self.prepare_sampling(true)?;
         self.write_guided_params(0, rows)?;
         let gpu = self.gpu.clone();
         let key = self.key(Kernel::Noise);

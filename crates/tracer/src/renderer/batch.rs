@@ -37,7 +37,7 @@ impl Renderer {
 
     /// Of a batch of so many samples, with what they are chosen by.
     pub(super) fn write_params(&mut self, samples: u32) -> Result<(), RenderError> {
-        self.prepare_sampling(false);
+        self.prepare_sampling(false)?;
         self.write_guided_params(samples, self.guide().map_or(0, Guide::rows))
     }
 

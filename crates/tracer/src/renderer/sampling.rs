@@ -3,13 +3,16 @@
 
 use glam::Quat;
 
-use super::Renderer;
+use super::{RenderError, Renderer};
 use crate::{
-    distribution::{Encoded, FilmFrame, TableWords},
+    distribution::{Encoded, FilmFrame, Layer, TableWords},
     film::FilmOptions,
     guide::Guide,
     kernels::layout::{MAX_LAYERS, SampleLayer},
 };
+
+/// The random number that chooses a pixel of a list has 24 bits.
+const LONGEST_LIST: u64 = 1 << 24;
 
 /// What is on the device, and where in the buffer its parts begin.
 #[derive(Debug)]
@@ -60,11 +63,12 @@ impl Renderer {
     /// Brings to the device what the next batch's samples are chosen by, where it has changed.
     ///
     /// `is_judged`: the unit square is to be that of the layers alone.
-    pub(super) fn prepare_sampling(&mut self, is_judged: bool) {
+    pub(super) fn prepare_sampling(&mut self, is_judged: bool) -> Result<(), RenderError> {
         let key = Key { film: self.options.film, world_from_film: self.pose.world_from_film, is_judged };
         if self.sampling.key == Some(key) {
-            return;
+            return Ok(());
         }
+        self.check_pixel_lists()?;
         let frame = FilmFrame { options: &self.options.film, world_from_film: self.pose.world_from_film };
         let guide = self.guide().filter(|_| !is_judged);
         let Encoded { layers, layer_count, pixels: mut words, fovea, fovea_end, guide } =
@@ -76,7 +80,7 @@ impl Renderer {
         words.extend(table.cells);
         let guide_first = words.len() as u32;
         words.extend(guide.iter().flat_map(Guide::table).map(f32::to_bits));
-        self.upload_pixel_list(&words);
+        self.upload_pixel_list(&words)?;
         self.sampling = Sampling {
             key: Some(key),
             layers,
@@ -87,14 +91,35 @@ impl Renderer {
             fovea_cell_bits: table.cell_bits,
             fovea_end,
         };
+        Ok(())
     }
 
-    fn upload_pixel_list(&mut self, words: &[u32]) {
+    /// Of a longer list the random number that chooses the pixel could not reach every one.
+    fn check_pixel_lists(&self) -> Result<(), RenderError> {
+        let lengths = self.distribution.layers().iter().filter_map(|(_, layer)| match layer {
+            Layer::Pixels(list) => Some(list.len() as u64),
+            _ => None,
+        });
+        match lengths.max() {
+            Some(pixels) if pixels > LONGEST_LIST => Err(RenderError::PixelListTooLong { pixels, limit: LONGEST_LIST }),
+            _ => Ok(()),
+        }
+    }
+
+    fn upload_pixel_list(&mut self, words: &[u32]) -> Result<(), RenderError> {
         let bytes: &[u8] = bytemuck::cast_slice(words);
+        let limit = self.gpu.largest_binding();
+        if bytes.len() as u64 > limit {
+            return Err(RenderError::PixelListsTooLarge {
+                bytes: bytes.len() as u64,
+                limit,
+                adapter: self.gpu.info().name.clone(),
+            });
+        }
         if self.pixel_list.size() < bytes.len() as u64 {
             self.pixel_list = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("pixel list"),
-                size: (bytes.len() as u64).next_power_of_two(),
+                size: (bytes.len() as u64).next_power_of_two().min(limit),
                 usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
             });
@@ -103,5 +128,6 @@ impl Renderer {
             }
         }
         self.gpu.queue.write_buffer(&self.pixel_list, 0, bytes);
+        Ok(())
     }
 }
