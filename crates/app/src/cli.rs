@@ -25,7 +25,7 @@ use choices::{
 use gaze::{GazeArgs, PreviewGazeArgs};
 use sampler::SamplerArgs;
 use study::StudyArgs;
-use values::{CameraChoice, FilmShape, GazeAngles, Rgb, SizeMm, SizePx, ViewAngles};
+use values::{CameraChoice, EditsChoice, FilmShape, GazeAngles, Rgb, SizeMm, SizePx, ViewAngles};
 
 /// Foveated progressive preview of glTF scenes: looks converge first where you look.
 #[derive(Debug, Parser)]
@@ -132,7 +132,7 @@ pub struct RenderArgs {
     #[arg(long, value_enum, value_name = "AXES")]
     pub orient: Option<Orient>,
     /// The view of modes vp and vp-region and of --clip view, degrees from the film's centre
-    /// [default: 0,0,100x100; the whole film for perspective]
+    /// [default: 0,0,100x100; the whole film for perspective, which must show some of it]
     #[arg(long, allow_hyphen_values = true, value_name = "YAW,PITCH,HFOVxVFOV")]
     pub view: Option<ViewAngles>,
     /// Where one looks, degrees from the film's centre, + to the right and + up
@@ -141,9 +141,9 @@ pub struct RenderArgs {
     /// Follow a recorded gaze: samples are shared out over the recording's time (mode fv; the screen shows --view)
     #[arg(long, value_name = "FILE", conflicts_with_all = ["gaze", "seconds"])]
     pub gaze_trace: Option<PathBuf>,
-    /// Clip foveated samples to the view and a margin
-    #[arg(long, value_enum, default_value_t = Clip::None, value_name = "CLIP")]
-    pub clip: Clip,
+    /// Clip foveated samples to the view and a margin [default: none; view for perspective, beside which samples are lost]
+    #[arg(long, value_enum, value_name = "CLIP")]
+    pub clip: Option<Clip>,
     /// Where eccentricity is measured: in the scene, or at the eye before a screen that shows the view
     #[arg(long, value_enum, default_value_t = EccentricityAt::Scene, value_name = "PLACE")]
     pub eccentricity: EccentricityAt,
@@ -151,6 +151,10 @@ pub struct RenderArgs {
     /// gaze and scene are the command line's, and --samples and --spp count what the film holds already
     #[arg(long, value_name = "FILM.exr")]
     pub resume: Option<PathBuf>,
+    /// Edits that the window saved: those beside the scene (SCENE.fovea.json), those of a file, or none [default: none, with a
+    /// note where some lie beside it]
+    #[arg(long, value_name = "beside|FILE|none")]
+    pub edits: Option<EditsChoice>,
     /// Index of the first sample: ranges of one seed that are rendered apart add up to one render (`fovea merge`)
     #[arg(
         long, allow_negative_numbers = true, default_value_t = 0, conflicts_with = "resume",
@@ -202,6 +206,10 @@ pub struct InfoArgs {
     /// What of the file is shown.
     #[command(flatten)]
     pub file: FileArgs,
+    /// Edits that the window saved: those beside the scene (SCENE.fovea.json), those of a file, or none [default: none, with a
+    /// note where some lie beside it]
+    #[arg(long, value_name = "beside|FILE|none")]
+    pub edits: Option<EditsChoice>,
     /// Print one JSON object on standard output
     #[arg(long)]
     pub json: bool,

@@ -9,6 +9,7 @@ use crate::cli::{Cli, Command};
 
 pub mod adapters;
 pub mod bench;
+mod edits;
 pub mod gaze;
 pub mod info;
 pub mod merge;

@@ -33,6 +33,15 @@ fn bad_input_is_refused_in_one_line_and_no_file_is_touched() {
     refuses(&["render", scene, "-o", out, "--adapter", "abacus"], &["abacus"]);
     refuses(&["render", scene, "-o", out, "--view", "0,0,200x10"], &["--view", "0.1..=170"]);
     refuses(&["render", scene, "-o", out, "--film", "equirect:65536x65536"], &["65536x65536", "bytes"]);
+    for mode in ["vp", "vp-region", "fv"] {
+        let beside = ["--film", "perspective:32x32", "--view", "120,0,20x20", "--mode", mode];
+        refuses(&[&["render", scene, "-o", out], beside.as_slice()].concat(), &["--view", "beside the film"]);
+    }
+    let edits = folder.path("bad.json");
+    std::fs::write(&edits, "[]").unwrap();
+    refuses(&["render", scene, "-o", out, "--edits", text(&edits)], &["--edits", "bad.json", "fovea-edits"]);
+    refuses(&["info", scene, "--edits", "beside"], &["--edits", "square.gltf.fovea.json", "No such file"]);
+    std::fs::remove_file(edits).unwrap();
     refuses(&["render", scene, "-o", out, "--inverse", "eq6"], &["--inverse"]);
     refuses(&["render", scene, "-o", text(&folder.path("out.jpg"))], &["out.jpg", ".exr or .png"]);
     refuses(&["render", scene, "-o", text(&folder.path("no/such/folder/out.png"))], &["out.png", "cannot be written"]);
@@ -46,6 +55,8 @@ fn bad_input_is_refused_in_one_line_and_no_file_is_touched() {
     refuses(&["render", scene, "-o", &format!("{out}/")], &["out.exr/", "folder"]);
     let study = folder.path("study");
     refuses(&["study", scene, text(&missing), "--film", "16x8", "-o", text(&study)], &["missing.glb"]);
+    let of_domain_user = folder.path("user@domain/missing.glb");
+    refuses(&["study", text(&of_domain_user), "--film", "16x8", "-o", text(&study)], &["user@domain/missing.glb"]);
     refuses(&["study", "--only", "report", "-o", text(&study)], &["study", "cannot be read"]);
     let numbers = folder.path("numbers.csv");
     std::fs::write(&numbers, "u\n0.5\nhalf\n").unwrap();
@@ -209,6 +220,81 @@ fn a_png_shows_what_is_known_about_its_pixels() {
         assert!(near(32, 16, at_centre), "{show}: {:?}", picture.get_pixel(32, 16));
         assert!(near(0, 16, at_edge), "{show}: {:?}", picture.get_pixel(0, 16));
     }
+}
+
+/// The figures are of samples that the film has; by default few miss a lens.
+#[test]
+fn samples_beside_a_film_are_told_and_not_counted() {
+    let folder = Folder::new("beside");
+    let (scene, out) = (folder.path("square.gltf"), folder.path("out.exr"));
+    let render = |more: &[&str]| {
+        let film = ["render", text(&scene), "-o", text(&out), "--film", "perspective:48x32", "--samples", "20000"];
+        let report = json(&[film.as_slice(), &["--json"], more].concat());
+        let held: u64 = exr::read(&out).unwrap().film.pixels().map(|pixel| u64::from(pixel.samples)).sum();
+        let [on_film, beside] = ["on", "beside"].map(|place| report[format!("samples_{place}_film")].as_u64().unwrap());
+        assert_eq!((on_film, on_film + beside), (held, report["samples"].as_u64().unwrap()), "{report}");
+        assert!(report["mean_path_length"].as_f64().unwrap() >= 1.0, "{report}");
+        let rate = report["samples_per_s"].as_f64().unwrap() * report["seconds"].as_f64().unwrap();
+        (beside, rate / on_film as f64)
+    };
+    let (usual, free, all) = (render(&[]), render(&["--clip", "none"]), render(&["--mode", "vp"]));
+    assert!(free.0 > 5_000 && usual.0 < 3_000 && all.0 == 0, "{usual:?} {free:?} {all:?}");
+    for (_, rate) in [usual, free, all] {
+        assert!((rate - 1.0).abs() < 1e-6, "a rate of what is on the film: {rate}");
+    }
+    // A film that goes on has what was on it before.
+    let first = folder.path("first.exr");
+    std::fs::rename(&out, &first).unwrap();
+    let (beside, rate) = render(&["--resume", text(&first)]);
+    assert!(beside == 0 && rate < 1e-6, "nothing was left to be traced: {beside} {rate}");
+}
+
+/// Edits that the window saved: left out with a note, or taken, also by a render that goes on.
+#[test]
+fn saved_edits_are_rendered_when_they_are_asked_for() {
+    let folder = Folder::new("edits");
+    let scene = folder.path("square.gltf");
+    let sky = folder.path("sky.hdr");
+    image::save_buffer_with_format(
+        &sky,
+        bytemuck::cast_slice(&[[0.5f32, 1.0, 2.0]; 8]),
+        4,
+        2,
+        image::ColorType::Rgb32F,
+        image::ImageFormat::Hdr,
+    )
+    .unwrap();
+    let edits = format!(
+        r#"{{ "format": "fovea-edits", "version": 1, "nodes": [{{ "name": "gone", "occurrence": 0, "hidden": true }}],
+        "environment": {{ "image": {:?} }} }}"#,
+        text(&sky)
+    );
+    std::fs::write(folder.path("square.gltf.fovea.json"), edits).unwrap();
+    let render = |out: &Path, more: &[&str]| {
+        let film = ["render", text(&scene), "-o", text(out), "--film", "equirect:32x16"];
+        let output = fovea(&[film.as_slice(), more].concat());
+        let notes = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{notes}");
+        notes
+    };
+    let [plain, half, whole, again] =
+        ["plain", "half", "whole", "again"].map(|name| folder.path(&format!("{name}.exr")));
+    let notes = render(&plain, &["--samples", "4096"]);
+    assert!(notes.contains("square.gltf.fovea.json are left out; --edits beside"), "{notes}");
+    assert!(!render(&plain, &["--samples", "4096", "--edits", "none"]).contains("left out"));
+    let notes = render(&half, &["--samples", "4096", "--edits", "beside"]);
+    assert!(notes.contains("the scene has no object 'gone'"), "{notes}");
+    assert_ne!(exr::read(&half).unwrap().film.words, exr::read(&plain).unwrap().film.words);
+    render(&whole, &["--samples", "8192", "--edits", "beside"]);
+    render(&again, &["--samples", "8192", "--edits", "beside", "--resume", text(&half)]);
+    assert_eq!(std::fs::read(&again).unwrap(), std::fs::read(&whole).unwrap());
+    // Without them it is a film of another scene.
+    let resume = ["render", text(&scene), "-o", text(&again), "--resume", text(&half)];
+    let output = fovea(&resume);
+    assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stderr));
+    let info = |more: &[&str]| json(&[&["info", text(&scene), "--json"], more].concat());
+    assert!(info(&["--edits", "beside"])["environment"].as_str().unwrap().contains("image 4x2"));
+    assert!(info(&[])["warnings"].to_string().contains("are left out"));
 }
 
 #[test]

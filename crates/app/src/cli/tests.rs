@@ -41,7 +41,7 @@ fn defaults_are_those_of_the_documentation() {
     assert_eq!(args.sampling.mode, Mode::Fv);
     assert_eq!(args.film, FilmShape::Equirect(SizePx { width: 2048, height: 1024 }));
     assert_eq!(args.gaze, GazeAngles { yaw_deg: 0.0, pitch_deg: 0.0 });
-    assert_eq!((args.clip, args.eccentricity), (Clip::None, EccentricityAt::Scene));
+    assert_eq!((args.clip, args.eccentricity), (None, EccentricityAt::Scene));
     assert_eq!((args.sampling.max_bounces, args.sampling.seed, args.sampling.floor), (8, 1, None));
     let preview = read("fovea").unwrap().preview;
     assert_eq!((preview.clip, preview.eccentricity), (Clip::View, EccentricityAt::Eye));

@@ -3,6 +3,7 @@
 use std::convert::Infallible;
 use std::fmt;
 use std::ops::RangeInclusive;
+use std::path::PathBuf;
 use std::str::FromStr;
 
 use crate::view::FOV_RANGE_DEG;
@@ -49,6 +50,29 @@ impl FromStr for SizeMm {
         let (width, height) = text.split_once('x').ok_or("expected WIDTHxHEIGHT, for example 531x299")?;
         let side = |text: &str| in_range(text, 10.0, 100_000.0, "mm");
         Ok(Self { width: side(width)?, height: side(height)? })
+    }
+}
+
+/// Which saved edits of a scene are put onto it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum EditsChoice {
+    /// Those beside the scene.
+    Beside,
+    /// Those of a file.
+    File(PathBuf),
+    /// None, although there may be some.
+    None,
+}
+
+impl FromStr for EditsChoice {
+    type Err = Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Ok(match text {
+            "beside" => Self::Beside,
+            "none" => Self::None,
+            path => Self::File(path.into()),
+        })
     }
 }
 

@@ -1,23 +1,36 @@
 //! `fovea info`: what a scene holds, and what of it is not supported.
 
+use std::sync::Arc;
+
 use serde_json::{Value, json};
 use tracer::import::ImportReport;
 use tracer::scene::{Environment, Projection, PunctualKind, Scene};
 
-use super::{print_json, print_text};
+use super::{edits, print_json, print_text};
 use crate::cli::InfoArgs;
-use crate::session::{self, Source};
+use crate::session::{self, Loaded, Source};
 
 /// Prints what the scene holds.
 ///
 /// # Errors
 /// When the scene cannot be loaded.
 pub fn run(args: &InfoArgs) -> anyhow::Result<()> {
-    let (scene, report) = session::import(&Source::from(args.scene.as_deref()), &args.file)?;
-    if args.json { print_json(&describe(&scene, &report)) } else { print_text(&text(&scene, &report)) }
+    let source = Source::from(args.scene.as_deref());
+    let (scene, report) = session::import(&source, &args.file)?;
+    let mut loaded = Loaded {
+        scene: Arc::new(scene),
+        notes: report.warnings.iter().map(ToString::to_string).collect(),
+        nodes: report.nodes.clone(),
+        files: Vec::new(),
+        replaced_images: Vec::new(),
+        camera: None,
+    };
+    edits::apply(args.edits.as_ref(), &source, &mut loaded)?;
+    let Loaded { scene, notes, .. } = loaded;
+    if args.json { print_json(&describe(&scene, &report, &notes)) } else { print_text(&text(&scene, &report, &notes)) }
 }
 
-fn describe(scene: &Scene, report: &ImportReport) -> Value {
+fn describe(scene: &Scene, report: &ImportReport, notes: &[String]) -> Value {
     let (low, high) = scene.bounds().unwrap_or_default();
     json!({
         "scene": scene.name,
@@ -37,12 +50,12 @@ fn describe(scene: &Scene, report: &ImportReport) -> Value {
         "extensions_unsupported": report.extensions_unsupported,
         "variants": report.variants,
         "scenes": report.scenes,
-        "warnings": report.warnings.iter().map(ToString::to_string).collect::<Vec<_>>(),
+        "warnings": notes,
         "import_seconds": report.stage_seconds.total,
     })
 }
 
-fn text(scene: &Scene, report: &ImportReport) -> String {
+fn text(scene: &Scene, report: &ImportReport, notes: &[String]) -> String {
     let (low, high) = scene.bounds().unwrap_or_default();
     let size = high - low;
     let list = |names: &[String]| if names.is_empty() { "none".to_owned() } else { names.join(", ") };
@@ -72,7 +85,7 @@ fn text(scene: &Scene, report: &ImportReport) -> String {
     ];
     let mut text = format!("{}\n", scene.name);
     text.extend(rows.iter().map(|(name, value)| format!("  {name:<14} {value}\n")));
-    text.extend(report.warnings.iter().map(|warning| format!("  note: {warning}\n")));
+    text.extend(notes.iter().map(|note| format!("  note: {note}\n")));
     text
 }
 

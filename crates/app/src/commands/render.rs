@@ -8,15 +8,15 @@ use anyhow::{Context, bail};
 use glam::{Quat, Vec2};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Map, Value, json};
-use tracer::distribution::{Distribution, View};
-use tracer::film::{FilmMapping, FilmOptions};
+use tracer::distribution::{Distribution, View, film_direction};
+use tracer::film::{FilmMapping, FilmOptions, FilmSnapshot};
 use tracer::gpu::{AdapterSelect, Gpu};
 use tracer::renderer::{FilmPose, RenderStatistics, Renderer, RendererOptions, SceneReport, Schedule, StopCondition};
 use tracer::scene::Scene;
 use tracer::view::{ViewProjection, ViewSettings};
 
-use super::print_json;
-use crate::cli::choices::{EccentricityAt, Mode, Orient, Switch};
+use super::{edits, print_json};
+use crate::cli::choices::{Clip, EccentricityAt, Mode, Orient, Switch};
 use crate::cli::values::{FilmShape, ViewAngles};
 use crate::cli::{RenderArgs, StopArgs};
 use crate::output::exr::{self, FilmFile};
@@ -46,8 +46,10 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     check_writable(&args.output)?;
     let source = Source::from(args.scene.scene.as_deref());
     let import_start = Instant::now();
-    let Loaded { scene, notes, .. } = session::load(&source, &args.scene)?;
+    let mut loaded = session::load(&source, &args.scene)?;
+    edits::apply(args.edits.as_ref(), &source, &mut loaded)?;
     let import_seconds = import_start.elapsed().as_secs_f64();
+    let Loaded { scene, notes, .. } = loaded;
     for note in &notes {
         eprintln!("note: {note}");
     }
@@ -79,6 +81,7 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     renderer.set_pose(pose);
     renderer.set_first_sample(args.first_sample);
     renderer.set_adaptive(args.sampling.adaptive == Switch::On);
+    let held_on_film = resumed.as_ref().map_or(0, |file| file.film.samples_on_film());
     let earlier = match resumed.zip(args.resume.as_ref()) {
         Some((file, path)) => Some(resume::restore(&mut renderer, file, path)?),
         None => None,
@@ -98,9 +101,18 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     let header = renderer.film_header()?;
     let run = RunSettings { scene: &scene.name, film: &header, aim: &aim, acuity: args.sampling.acuity() };
     let settings = with_trace(run.to_json(), args);
+    // A panorama has all samples: it is not read for that.
+    let is_panorama = film.mapping == FilmMapping::Equirect;
+    let snapshot = (format == ImageFormat::Exr || !is_panorama).then(|| renderer.snapshot()).transpose()?;
+    let samples = header.statistics.samples;
+    let on_film = snapshot.as_ref().map_or(samples, FilmSnapshot::samples_on_film);
+    if on_film < samples {
+        let percent = (samples - on_film) as f64 / samples as f64 * 100.0;
+        eprintln!("note: {percent:.1} % of the samples fell beside the film");
+    }
     match format {
         ImageFormat::Exr => {
-            let film = renderer.snapshot()?;
+            let film = snapshot.map_or_else(|| renderer.snapshot(), Ok)?;
             let file = match earlier {
                 Some(earlier) => FilmFile::gone_on(earlier, film, &settings),
                 None => FilmFile::new(film, settings.clone()),
@@ -114,7 +126,8 @@ pub fn run(args: &RenderArgs) -> anyhow::Result<()> {
     }
     if args.json {
         let (schedule, statistics) = (renderer.schedule(), header.statistics);
-        let run = Run { seconds, import_seconds, prepared, before, statistics, schedule };
+        let on_film = [held_on_film, on_film];
+        let run = Run { seconds, import_seconds, prepared, before, statistics, on_film, schedule };
         return print_json(&run.to_json(&gpu, &scene, &film, &settings));
     }
     Ok(())
@@ -182,14 +195,37 @@ fn aim(args: &RenderArgs, film: &FilmOptions, world_from_film: Quat) -> anyhow::
         bail!("--gaze lies outside --view: with --eccentricity eye one looks at the screen that shows the view");
     }
     let screen = args.sampling.screen();
-    Ok(Aim {
+    let aim = Aim {
         mode: args.sampling.mode,
         view,
         gaze: GazePoint::towards(gaze, &view),
-        clip: args.clip,
+        clip: args.clip.unwrap_or(match film.mapping {
+            FilmMapping::Equirect => Clip::None,
+            FilmMapping::Perspective { .. } => Clip::View,
+        }),
         eccentricity: args.eccentricity,
         screen_half_extent: Vec2::new(screen.width_mm, screen.height_mm) * 0.5 / screen.distance_mm,
-    })
+    };
+    let goes_by_view = match aim.mode {
+        Mode::Od => false,
+        Mode::Vp | Mode::VpRegion => true,
+        Mode::Fv => aim.clip == Clip::View || aim.eccentricity == EccentricityAt::Eye,
+    };
+    if goes_by_view && !is_met(&view, film, world_from_film) {
+        bail!("--view lies beside the film, which shows nothing of it");
+    }
+    Ok(aim)
+}
+
+/// Whether a film shows some of a view.
+fn is_met(view: &View, film: &FilmOptions, world_from_film: Quat) -> bool {
+    let is_inside = |pixel: u32| {
+        let in_film = film_direction(film, pixel % film.width, pixel / film.width);
+        view.project(world_from_film * in_film).is_some_and(|point| point.abs().max_element() <= 1.0)
+    };
+    // A small one may lie between the pixels' centres.
+    film.pixel_of(world_from_film.inverse() * view.direction(Vec2::ZERO)).is_some()
+        || (0..film.pixels() as u32).any(is_inside)
 }
 
 fn stop(args: &StopArgs, film: &FilmOptions) -> StopCondition {
@@ -306,6 +342,8 @@ struct Run {
     /// Of the film that was resumed.
     before: RenderStatistics,
     statistics: RenderStatistics,
+    /// Samples that fell on the film: before and in all.
+    on_film: [u64; 2],
     schedule: Schedule,
 }
 
@@ -314,7 +352,7 @@ impl Run {
         let info = gpu.info();
         let (statistics, before) = (&self.statistics, &self.before);
         let per_second = |now: u64, before: u64| (now - before) as f64 / self.seconds.max(1e-9);
-        let samples = statistics.samples;
+        let [on_film_before, on_film] = self.on_film;
         json!({
             "adapter": info.name,
             "backend": info.backend.to_string(),
@@ -323,7 +361,9 @@ impl Run {
             "scene": settings.get("scene"),
             "mode": settings.get("mode"),
             "gaze_trace": settings.get("gaze_trace"),
-            "samples": samples,
+            "samples": statistics.samples,
+            "samples_on_film": on_film,
+            "samples_beside_film": statistics.samples - on_film,
             "seconds": self.seconds,
             "stage_seconds": {
                 "import": self.import_seconds,
@@ -332,10 +372,10 @@ impl Run {
                 "kernel_compile": self.prepared.kernel_compile_secs,
                 "trace": self.seconds,
             },
-            "samples_per_s": per_second(samples, before.samples),
+            "samples_per_s": per_second(on_film, on_film_before),
             "segments_per_s": per_second(statistics.segments, before.segments),
             "shadow_rays_per_s": per_second(statistics.shadow_rays, before.shadow_rays),
-            "mean_path_length": statistics.segments as f64 / samples.max(1) as f64,
+            "mean_path_length": statistics.segments as f64 / on_film.max(1) as f64,
             "non_finite_dropped": statistics.non_finite,
             "clamped": statistics.clamped,
             "triangles": session::triangles(scene),

@@ -19,6 +19,7 @@ use super::tree::PartName;
 use super::{Document, Names};
 use crate::config;
 use crate::output::{OutputError, write_atomically};
+use crate::session::Source;
 
 /// What the file says it is.
 const FORMAT: &str = "fovea-edits";
@@ -30,7 +31,18 @@ const ENVIRONMENT: &str = "environment";
 /// How the names of such files end.
 pub const ENDING: &str = ".fovea.json";
 
+/// Where edits of the built-in scene are kept: in the working folder.
+const BUILT_IN: &str = "built-in";
+
 /// Where the edits of a scene are kept.
+pub fn beside(source: &Source) -> PathBuf {
+    match source {
+        Source::BuiltIn => path_for(Path::new(BUILT_IN)),
+        Source::File(path) => path_for(path),
+    }
+}
+
+/// Where the edits of a scene in a file are kept.
 pub fn path_for(scene: &Path) -> PathBuf {
     let mut name = scene.as_os_str().to_owned();
     name.push(ENDING);

@@ -30,8 +30,6 @@ pub mod properties;
 
 /// Points of the window per cell of the outline's grid.
 const OUTLINE_CELL: f32 = 2.0;
-/// Where edits of the built-in scene are kept: in the working folder.
-const BUILT_IN: &str = "built-in";
 
 /// What the outline was drawn for.
 #[derive(Clone, Debug)]
@@ -97,10 +95,6 @@ impl Editor {
 
     /// Without edits.
     fn new(source: &Source, loaded: &Loaded) -> Self {
-        let sidecar = match source {
-            Source::BuiltIn => sidecar::path_for(Path::new(BUILT_IN)),
-            Source::File(path) => sidecar::path_for(path),
-        };
         Self {
             document: Document::new(loaded),
             panel: PanelState::default(),
@@ -109,7 +103,7 @@ impl Editor {
             outline: None,
             message: None,
             source: source.clone(),
-            sidecar,
+            sidecar: sidecar::beside(source),
             asked_environment: None,
             reading: Reading::Done,
             is_unreadable: false,

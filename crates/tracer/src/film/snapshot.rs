@@ -195,6 +195,12 @@ impl FilmSnapshot {
         FilmPixel::from_words(words, self.header.radiance_scale, self.header.luminance_scale)
     }
 
+    /// Samples that fell on the film, also those that were not finite; a perspective film may have some that fell beside it.
+    pub fn samples_on_film(&self) -> u64 {
+        let counts = self.words.chunks_exact(FILM_WORDS as usize).map(|words| u64::from(words[6]));
+        counts.sum::<u64>() + u64::from(self.header.statistics.non_finite)
+    }
+
     /// All estimates, row by row.
     pub fn pixels(&self) -> impl Iterator<Item = FilmPixel> + '_ {
         (0..self.header.options.pixels() as usize).map(|index| self.pixel(index))
