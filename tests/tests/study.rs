@@ -168,8 +168,33 @@ fn a_small_study_leaves_all_its_outputs_and_goes_on_from_them() {
     assert!(again.starts_with(&there.concat()), "{again}");
     assert_eq!(again.lines().filter(|row| row.contains("20_-30")).count(), lost.len());
 
-    // Other settings do not mix with these.
+    // Other settings do not mix with these, nor another recording with one that came later.
     let refused = study(&folder, "--only curves --background 1,0,0").unwrap_err();
     assert!(refused.contains("other settings"), "{refused}");
+    let along = |yaw: u8| {
+        let trace = folder.join(format!("{yaw}.csv"));
+        std::fs::write(&trace, format!("# gaze-trace v1; space=view_deg\n0,0,0,1\n1,{yaw},0,1\n")).unwrap();
+        study(&folder, &format!("--only curves --gaze-trace {}", trace.display()))
+    };
+    along(10).unwrap();
+    assert!(folder.join("runs").join("builtin_0_0_fv-wander_2.csv").exists());
+    along(10).unwrap();
+    let refused = along(20).unwrap_err();
+    assert!(refused.contains("other settings"), "{refused}");
+    study(&folder, "--only curves").unwrap();
+
+    // Curves of two revisions say so.
+    let path = folder.join("provenance.json");
+    let mut provenance: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+    let here = provenance["curves"]["commit"].clone();
+    provenance["curves"]["commit"] = "another".into();
+    std::fs::write(&path, provenance.to_string()).unwrap();
+    std::fs::remove_file(folder.join("runs").join("builtin_0_0_fv_2.csv")).unwrap();
+    study(&folder, "--only curves").unwrap();
+    let provenance: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+    assert_eq!(
+        (&provenance["curves"]["commit"], &provenance["curves"]["later"][0]["commit"]),
+        (&"another".into(), &here)
+    );
     std::fs::remove_dir_all(folder).unwrap();
 }

@@ -1,6 +1,6 @@
 //! `fovea study`: its options.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
@@ -89,7 +89,9 @@ impl FromStr for StudyScene {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let (path, camera) = match text.rsplit_once('@') {
+        // Names of files and folders may have one, too.
+        let is_camera = |camera: &str| !camera.contains(['/', '\\']) && !Path::new(text).exists();
+        let (path, camera) = match text.rsplit_once('@').filter(|(_, camera)| is_camera(camera)) {
             Some((path, camera)) => (path, Some(camera.parse().map_err(|_| "no camera after the @".to_owned())?)),
             None => (text, None),
         };

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use serde_json::{Value, json};
 use tracer::renderer::SequenceKind;
+use tracer::scene::ContentHash;
 
 use super::bench::{self, Bench, Picture};
 use super::error::{Film, Reference, Regions, Rgb, by_region, luminance};
@@ -196,15 +197,41 @@ fn settings(bench: &Bench, args: &StudyArgs) -> Value {
     })
 }
 
+/// Name of the setting that only the curve along a recording depends on: that may be added to a study, or left out, later.
+const TRACE: &str = "gaze_trace";
+
 /// Makes sure that a folder holds no curves of other settings of a scene, and says what its settings are.
 fn claim(bench: &Bench, args: &StudyArgs) -> anyhow::Result<()> {
     let path = args.output.join("references").join(format!("{}.json", bench.name));
-    let text = format!("{:#}\n", settings(bench, args));
-    match std::fs::read_to_string(&path) {
-        Ok(found) if found == text => Ok(()),
-        Ok(_) => bail!("{}: the folder holds a study with other settings; take another --out", path.display()),
-        Err(_) => Ok(write_text(&path, &text)?),
+    let mut wanted = settings(bench, args);
+    let found = std::fs::read_to_string(&path).ok();
+    // What is no JSON is no study of these settings either.
+    let known = found.map(|text| serde_json::from_str(&text).unwrap_or(Value::Null));
+    let known_trace = known.as_ref().map_or(Value::Null, |known: &Value| known[TRACE].clone());
+    let trace = match &args.gaze_trace {
+        Some(path) => {
+            let bytes = std::fs::read(path).with_context(|| path.display().to_string())?;
+            ContentHash::of(&[&bytes]).to_string().into()
+        }
+        None => known_trace.clone(),
+    };
+    let is_same_trace = known_trace.is_null() || known_trace == trace;
+    if !trace.is_null() {
+        wanted[TRACE] = trace;
     }
+    match known {
+        Some(known) if known == wanted => return Ok(()),
+        Some(mut known) => {
+            if let Some(known) = known.as_object_mut() {
+                known.insert(TRACE.into(), wanted[TRACE].clone());
+            }
+            if !is_same_trace || known != wanted {
+                bail!("{}: the folder holds a study with other settings; take another --out", path.display());
+            }
+        }
+        None => {}
+    }
+    Ok(write_text(&path, &format!("{wanted:#}\n"))?)
 }
 
 /// Renders what is missing of a scene's runs. `progress` hears the fraction that is done.

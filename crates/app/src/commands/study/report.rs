@@ -21,7 +21,8 @@ use crate::output::write_text;
 const PROVENANCE: &str = "provenance.json";
 
 /// Notes with what a part of the study is measured that begins now: curves or rates. Curves say where the first of them were
-/// measured, rates where the last; the command lines of all are kept.
+/// measured, and where later ones were if that is elsewhere, of which a line tells; rates where the last; the command lines of all
+/// are kept.
 ///
 /// # Errors
 /// When the file cannot be written.
@@ -30,8 +31,17 @@ pub fn write_provenance(args: &StudyArgs, gpu: &Gpu, part: Part) -> anyhow::Resu
     let mut all = read_provenance(&args.output);
     let name = if part == Part::Rates { "rates" } else { "curves" };
     let commands = with_command(all[name]["command"].as_str(), command());
+    let is_elsewhere =
+        |known: &Value| ["machine", "adapter", "commit"].iter().any(|field| known[*field] != here[*field]);
     if part == Part::Rates || all[name].is_null() {
         all[name] = here;
+    } else if is_elsewhere(&all[name]) {
+        eprintln!("note: the folder's first curves are of another machine, adapter or revision: {PROVENANCE} has both");
+        let mut later = all[name]["later"].as_array().cloned().unwrap_or_default();
+        if later.iter().all(is_elsewhere) {
+            later.push(here);
+            all[name]["later"] = later.into();
+        }
     }
     all[name]["command"] = commands.into();
     Ok(write_text(&args.output.join(PROVENANCE), &format!("{all:#}\n"))?)
