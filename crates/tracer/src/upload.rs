@@ -219,7 +219,7 @@ fn upload_image(gpu: &Gpu, label: &str, [width, height]: [u32; 2], texels: &[[f3
 impl SceneOnGpu {
     /// Builds and uploads what is not in `cache` since an earlier version of the scene, but for an edit of tables that this version
     /// shares with the last one: once it is written, the last version can no longer be traced. If it is not to be written, the cache
-    /// must [forget](SceneCache::forget_device) it.
+    /// must forget it.
     ///
     /// # Errors
     /// When a part exceeds the adapter's limits or its memory.
