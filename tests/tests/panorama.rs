@@ -39,17 +39,7 @@ fn eye_in(
     settings: &EyeSettings,
 ) -> Vec<[u8; 4]> {
     let gpu = renderer.gpu().clone();
-    let [width, height] = settings.size;
-    let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("eye"),
-        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-        view_formats: &[],
-    });
+    let texture = fovea_app::readback::picture_texture_in(&gpu, settings.size, format);
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     let target = texture.create_view(&Default::default());
     renderer.draw_eye(&mut encoder, panorama, settings, &target, format).unwrap();

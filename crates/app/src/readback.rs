@@ -13,13 +13,18 @@ pub const FIRST_HITS_AT_ONCE: u32 = 1 << 15;
 
 /// A texture that the renderer draws to, egui shows, and [`read_texture`] reads.
 pub fn picture_texture(gpu: &Gpu, size: [u32; 2]) -> wgpu::Texture {
+    picture_texture_in(gpu, size, PICTURE_FORMAT)
+}
+
+/// The same in another format of four bytes a pixel.
+pub fn picture_texture_in(gpu: &Gpu, size: [u32; 2], format: wgpu::TextureFormat) -> wgpu::Texture {
     gpu.device.create_texture(&wgpu::TextureDescriptor {
         label: Some("picture"),
         size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
         mip_level_count: 1,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
-        format: PICTURE_FORMAT,
+        format,
         usage: wgpu::TextureUsages::RENDER_ATTACHMENT
             | wgpu::TextureUsages::TEXTURE_BINDING
             | wgpu::TextureUsages::COPY_SRC,

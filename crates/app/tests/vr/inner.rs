@@ -108,16 +108,7 @@ fn each_eye_sees_what_a_headless_render_of_its_pose_shows() {
             };
             assert_eq!(format, wgpu::TextureFormat::Rgba8UnormSrgb);
             // As the runtime's, but one that can be read.
-            let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some("eye"),
-                size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-                view_formats: &[],
-            });
+            let texture = readback::picture_texture_in(&gpu, size, format);
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             let target = texture.create_view(&Default::default());
             renderer.draw_eye(&mut encoder, &panorama, &settings, &target, format).unwrap();
