@@ -29,7 +29,7 @@ pub fn apply(choice: Option<&EditsChoice>, source: &Source, loaded: &mut Loaded)
     let mut document = Document::new(loaded);
     let absent = document.load_edits(path).map_err(|reason| anyhow!(reason)).context("--edits")?;
     loaded.notes.extend(absent.iter().map(|part| format!("{}: the scene has no {part}", path.display())));
-    while let Some(image) = document.wanted_environment().map(Path::to_owned) {
+    if let Some(image) = document.wanted_environment().map(Path::to_owned) {
         let read = tracer::environment::load(&image).with_context(|| path.display().to_string())?;
         document.add_environment(image, read.image.into());
     }

@@ -86,8 +86,12 @@ impl Editor {
         }
         if let Some(recovered) = sidecar::recovered(&editor.sidecar) {
             let name = recovered.display();
-            let text =
-                format!("{name} has edits that were not saved when the window ended; File, Open edits takes them");
+            // What is wrong with the file of edits is said as well.
+            let before = editor.message.take().filter(|message| message.wrong).map(|message| message.text + "; ");
+            let text = format!(
+                "{}{name} has edits that were not saved when the window ended; File, Open edits takes them",
+                before.unwrap_or_default()
+            );
             editor.message = Some(Message::now(text, true));
         }
         editor

@@ -148,6 +148,13 @@ fn edits_of_a_window_that_ends_are_kept_and_named_until_others_are_saved() {
         hide(&mut editor, place);
         assert_eq!(editor.rescue().unwrap().unwrap(), folder.join(name), "an earlier one is not lost");
     }
+    let sidecar = folder.join("room.glb.fovea.json");
+    std::fs::write(&sidecar, "{").unwrap();
+    let file = std::fs::File::options().append(true).open(&sidecar).unwrap();
+    file.set_modified(std::time::SystemTime::UNIX_EPOCH).unwrap();
+    let broken = Editor::open(&source, &loaded).message().unwrap().text.clone();
+    assert!(broken.contains("room.glb.fovea.json:") && broken.contains("recovered-2.json"), "{broken}");
+    std::fs::remove_file(&sidecar).unwrap();
     let mut again = Editor::open(&source, &loaded);
     assert!(again.message().unwrap().text.contains("recovered-2.json"), "{:?}", again.message());
     assert!(again.document.edits().is_empty());
