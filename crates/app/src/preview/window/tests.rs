@@ -14,6 +14,9 @@ use crate::gaze::hub::GazeHub;
 use crate::reload::rule::Timing;
 use crate::session;
 
+/// Of the window, points.
+const SIZE: [f32; 2] = [320.0, 180.0];
+
 /// A file as the system drops it.
 #[derive(Debug)]
 pub(super) struct Dropped(pub PathBuf);
@@ -49,7 +52,7 @@ fn args() -> PreviewArgs {
     cli::parse(line.split(' ').map(Into::into)).unwrap().preview
 }
 
-fn window(args: &PreviewArgs, gpu: &Gpu) -> Window {
+pub(super) fn window(args: &PreviewArgs, gpu: &Gpu) -> Window {
     let gaze = Arc::new(GazeHub::new(&[], None).unwrap());
     let engine = Engine::start(gpu.clone(), args, Arc::clone(&gaze), || ()).unwrap();
     let loader = Loader::start(args.scene.clone(), Timing::default(), || ()).unwrap();
@@ -57,13 +60,13 @@ fn window(args: &PreviewArgs, gpu: &Gpu) -> Window {
     Window::new(engine, loader, String::new(), args, gaze, (Store::default(), None), None)
 }
 
-fn frames(window: Window) -> Harness<'static, Window> {
+pub(super) fn frames(window: Window, size: [f32; 2]) -> Harness<'static, Window> {
     let mut frame = eframe::Frame::_new_kittest();
     let draw = move |ui: &mut Ui, window: &mut Window| eframe::App::ui(window, ui, &mut frame);
-    Harness::builder().with_size([320.0, 180.0]).build_ui_state(draw, window)
+    Harness::builder().with_size(size).build_ui_state(draw, window)
 }
 
-fn step_until(harness: &mut Harness<'_, Window>, what: &str, arrived: impl Fn(&Window) -> bool) {
+pub(super) fn step_until(harness: &mut Harness<'_, Window>, what: &str, arrived: impl Fn(&Window) -> bool) {
     let start = Instant::now();
     while !arrived(harness.state()) {
         let said = harness.state().note.as_ref().map(|note| &note.text);
@@ -102,7 +105,7 @@ fn a_film_waits_for_the_environment_that_its_edits_name() {
     let mut settings = Map::new();
     settings.insert("scene".into(), scene.name.clone().into());
     window.resume(&folder.join("film.exr"), Box::new(FilmFile::new(film, settings)));
-    let mut harness = frames(window);
+    let mut harness = frames(window, SIZE);
     let gone_on = |window: &Window| {
         let wrong = window.note.as_ref().is_some_and(|note| note.wrong);
         assert!(!wrong, "{:?}", window.note);
@@ -118,7 +121,7 @@ fn a_film_waits_for_the_environment_that_its_edits_name() {
 fn what_is_dropped_with_or_before_a_scene_is_for_that_scene() {
     let (folder, args) = (folder("dropped"), args());
     let gpu = Gpu::headless(&AdapterSelect::Auto).unwrap();
-    let mut harness = frames(window(&args, &gpu));
+    let mut harness = frames(window(&args, &gpu), SIZE);
     drop_files(&mut harness, &folder, &["sky.hdr"]);
     assert!(harness.state().note.as_ref().unwrap().text.contains("sky.hdr is taken"));
     let is_lit = |window: &Window, scene: &str| {

@@ -1,19 +1,16 @@
 //! What somebody does who is timed, in the window without a display.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
-use eframe::App;
 use egui::{Event, Key, Modifiers, MouseWheelSource, MouseWheelUnit, PointerButton, TouchPhase, pos2, vec2};
 use egui_kittest::Harness;
 use tracer::gpu::{AdapterSelect, Gpu};
 
-use super::tests::Dropped;
+use super::tests::{Dropped, frames, step_until, window};
 use super::*;
 use crate::cli;
 use crate::document::edits::{Edits, Part};
-use crate::gaze::hub::GazeHub;
 use crate::preview::navigation::Standpoint;
 use crate::preview::split_panel;
-use crate::reload::rule::Timing;
 
 /// What somebody who is timed must not change.
 fn what_is_seen(window: &Window) -> (Standpoint, Option<Part>, Edits, Controls, Visibility) {
@@ -65,23 +62,12 @@ fn input_during_a_trial_of_split_times_changes_nothing_and_esc_keeps_the_trials_
     std::fs::create_dir_all(&folder).unwrap();
     let line = "fovea --film-memory 16 --max-bounces 0";
     let args = cli::parse(line.split(' ').map(Into::into)).unwrap().preview;
-    let gaze = Arc::new(GazeHub::new(&[], None).unwrap());
-    let gpu = Gpu::headless(&AdapterSelect::Auto).unwrap();
-    let engine = Engine::start(gpu, &args, Arc::clone(&gaze), || {}).unwrap();
-    let loader = Loader::start(args.scene.clone(), Timing::default(), || {}).unwrap();
-    loader.open(Source::BuiltIn);
-    let (store, gaze) = (Store::load_from(&folder.join("settings.json")), GazeControl::new(gaze, &args));
-    let mut window = Window::new(engine, loader, "an adapter".into(), &args, gaze, store, None);
+    let mut window = window(&args, &Gpu::headless(&AdapterSelect::Auto).unwrap());
+    window.loader.open(Source::BuiltIn);
     window.split.folders = vec![folder.clone()];
     (window.split.plan.modes, window.split.plan.repetitions) = (vec![Mode::Fv, Mode::Od], 2);
-    let draw = |ui: &mut Ui, window: &mut Window| window.ui(ui, &mut eframe::Frame::_new_kittest());
-    let mut harness = Harness::builder().with_size([1280.0, 720.0]).build_ui_state(draw, window);
-    let end = Instant::now() + Duration::from_secs(60);
-    while harness.state().editor.is_none() {
-        assert!(Instant::now() < end, "the scene does not open");
-        std::thread::sleep(Duration::from_millis(20));
-        harness.run_steps(1);
-    }
+    let mut harness = frames(window, [1280.0, 720.0]);
+    step_until(&mut harness, "the scene opens", |window| window.editor.is_some());
 
     let before = what_is_seen(harness.state());
     disturb(&mut harness, "a sky.hdr");
