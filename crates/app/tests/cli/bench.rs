@@ -81,7 +81,7 @@ fn the_built_in_scene_is_measured_part_by_part() {
 
     let edits = &scene["edits"];
     assert!(all_positive(&edits["material_s"], 2) && all_positive(&edits["move_s"], 2));
-    assert!(all_positive(&edits["first_move_s"], 1) && all_positive(&edits["gaze_s"], 2));
+    assert!(all_positive(&edits["first_move_s"], 2) && all_positive(&edits["gaze_s"], 2));
     let in_fovea = edits["samples_in_foveal_disc"].as_u64().unwrap();
     assert!(in_fovea > 0 && in_fovea < edits["samples"].as_u64().unwrap());
 

@@ -24,30 +24,8 @@ const BATCHES: [u32; 2] = [1 << 13, 1 << 10];
 /// # Errors
 /// When the scene does not fit the adapter or the device is lost.
 pub fn measure(gpu: &Gpu, args: &BenchArgs, subject: &Subject) -> anyhow::Result<Value> {
-    let mut scene = (*subject.scene).clone();
-    let (mut renderer, _) = subject.renderer(gpu, args, &scene)?;
     let place = subject.places.first().context("no gaze")?;
     let picture = Picture::new(gpu, place, size_px(gpu));
-    renderer.set_distribution(subject.distribution(Method::FvClip, place))?;
-    trace(&mut renderer)?;
-    picture.draw(&mut renderer)?;
-    // As the window does when the film has come to rest.
-    if let Some(rehearsal) = renderer.rehearsal(&Arc::new(scene.clone())) {
-        rehearsal.run(&AtomicBool::new(false))?.into_iter().for_each(|rehearsed| renderer.take_in(rehearsed));
-    }
-
-    let mut shown = |edit: &dyn Fn(&mut Scene), times: u32| -> anyhow::Result<Vec<f64>> {
-        let mut seconds = Vec::new();
-        for _ in 0..times {
-            edit(&mut scene);
-            let started = Instant::now();
-            renderer.set_scene(&scene)?;
-            trace(&mut renderer)?;
-            picture.draw(&mut renderer)?;
-            seconds.push(started.elapsed().as_secs_f64());
-        }
-        Ok(seconds)
-    };
     let tint = |scene: &mut Scene| {
         if let Some(material) = scene.materials.first_mut() {
             Arc::make_mut(material).base_color.x *= 0.9;
@@ -58,15 +36,57 @@ pub fn measure(gpu: &Gpu, args: &BenchArgs, subject: &Subject) -> anyhow::Result
             instance.world_from_mesh.translation.x += 1e-3;
         }
     };
-    let material = shown(&tint, args.rounds)?;
-    let first_move = shown(&shift, 1)?;
-    let moves = shown(&shift, args.rounds)?;
+    // A scene has one first move.
+    let first_moves = (0..args.rounds).map(|_| Edited::new(gpu, args, subject, place, &picture)?.shown(&shift));
+    let first_moves = first_moves.collect::<anyhow::Result<Vec<f64>>>()?;
+    let mut edited = Edited::new(gpu, args, subject, place, &picture)?;
+    let material = (0..args.rounds).map(|_| edited.shown(&tint)).collect::<anyhow::Result<Vec<f64>>>()?;
+    edited.shown(&shift)?;
+    let moves = (0..args.rounds).map(|_| edited.shown(&shift)).collect::<anyhow::Result<Vec<f64>>>()?;
+    let mut renderer = edited.renderer;
     let in_fovea = samples_in_fovea(&renderer, subject, place)?;
     let looks = looks_elsewhere(&mut renderer, gpu, args, subject)?;
     Ok(json!({
         "samples": BATCHES.iter().sum::<u32>(), "samples_in_foveal_disc": in_fovea,
-        "material_s": material, "first_move_s": first_move, "move_s": moves, "gaze_s": looks,
+        "material_s": material, "first_move_s": first_moves, "move_s": moves, "gaze_s": looks,
     }))
+}
+
+/// A scene that is being worked on.
+struct Edited<'a> {
+    scene: Scene,
+    renderer: Renderer,
+    picture: &'a Picture,
+}
+
+impl<'a> Edited<'a> {
+    /// At rest, with a first move rehearsed as by the window.
+    fn new(
+        gpu: &Gpu,
+        args: &BenchArgs,
+        subject: &Subject,
+        place: &Place,
+        picture: &'a Picture,
+    ) -> anyhow::Result<Self> {
+        let (mut renderer, _) = subject.renderer(gpu, args, &subject.scene)?;
+        renderer.set_distribution(subject.distribution(Method::FvClip, place))?;
+        trace(&mut renderer)?;
+        picture.draw(&mut renderer)?;
+        if let Some(rehearsal) = renderer.rehearsal(&subject.scene) {
+            rehearsal.run(&AtomicBool::new(false))?.into_iter().for_each(|rehearsed| renderer.take_in(rehearsed));
+        }
+        Ok(Self { scene: (*subject.scene).clone(), renderer, picture })
+    }
+
+    /// Seconds from an edit to its picture.
+    fn shown(&mut self, edit: &dyn Fn(&mut Scene)) -> anyhow::Result<f64> {
+        edit(&mut self.scene);
+        let started = Instant::now();
+        self.renderer.set_scene(&self.scene)?;
+        trace(&mut self.renderer)?;
+        self.picture.draw(&mut self.renderer)?;
+        Ok(started.elapsed().as_secs_f64())
+    }
 }
 
 /// As large as the window draws it while things change.
