@@ -10,6 +10,16 @@ use fovea_sampler::sequence::sobol;
 /// Index bits that a batch may permute: batches have at most 2^20 samples.
 pub const ORDER_BITS: usize = 20;
 
+/// Cells of the unit square, as powers of two along its axes, in which samples of one block of the sequence share what Russian roulette
+/// goes by.
+///
+/// Eight threads beside each other have all of it in common in batches of 2^14 and 2^15 samples, and half of it in batches of half or
+/// twice as many: where some of a software adapter's eight lanes have paths that go on, the others wait. It follows from a sample's
+/// number and its point alone, so that films do not depend on how the samples were cut into batches.
+pub const ROULETTE_CELL_BITS: [u32; 2] = [6, 5];
+/// Blocks are 2^this samples.
+pub const ROULETTE_BLOCK_BITS: u32 = 15;
+
 /// Columns of the matrix from thread bits to index bits, for a batch of 2^`log2_size` samples.
 ///
 /// # Panics
@@ -55,6 +65,31 @@ mod tests {
             .enumerate()
             .filter(|(bit, _)| thread >> bit & 1 == 1)
             .fold(0, |index, (_, column)| index ^ column)
+    }
+
+    /// Eight threads beside each other share the number of their roulette, and no more than 16 samples do.
+    #[test]
+    fn neighbours_share_their_roulette() {
+        let group_of = |index: u32| {
+            let [x, y] = [0, 1].map(|d| sobol(index, d as u32) >> (32 - ROULETTE_CELL_BITS[d]));
+            (index >> ROULETTE_BLOCK_BITS, x, y)
+        };
+        for (k, most_in_eight) in [(13, 2), (14, 1), (15, 1), (16, 2)] {
+            let columns = order_columns(k);
+            let mut sharing = std::collections::HashMap::new();
+            for first in (0..1 << k).step_by(8) {
+                let eight: Vec<_> =
+                    (first..first + 8).map(|thread| group_of(index_of_thread(&columns, thread))).collect();
+                let distinct: std::collections::HashSet<_> = eight.iter().collect();
+                assert!(
+                    distinct.len() <= most_in_eight,
+                    "2^{k} samples, threads from {first}: {} groups",
+                    distinct.len()
+                );
+                eight.into_iter().for_each(|group| *sharing.entry(group).or_insert(0) += 1);
+            }
+            assert!(sharing.values().all(|&samples| samples <= 16), "2^{k} samples: {:?}", sharing.values().max());
+        }
     }
 
     /// A permutation, and the first `2^(k-6)` parts of 64 threads each stay in a cell of their own.

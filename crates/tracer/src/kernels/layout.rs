@@ -116,7 +116,7 @@ shared! {
     /// What lies in memory of a path between two kernels of the wavefront schedule, beside its record.
     struct PathState {
         origin: [f32; 3],
-        has_extension: u32,
+        random_roulette: u32,
         direction: [f32; 3],
         shadow_t_max: f32,
         shadow_origin: [f32; 3],
