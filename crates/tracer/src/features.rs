@@ -153,7 +153,7 @@ impl SceneFeatures {
         let samples_light = emits || !scene.lights.is_empty() || matches!(scene.environment, Environment::Image { .. });
         Self::default()
             .with(Feature::Alpha, any(|m| m.alpha_mode != AlphaMode::Opaque))
-            .with(Feature::Textures, any(has_textures))
+            .with(Feature::Textures, any(|m| m.textures().next().is_some()))
             .with(
                 Feature::NormalMaps,
                 any(|m| m.normal_texture.is_some() || m.clearcoat > 0.0 && m.clearcoat_normal_texture.is_some()),
@@ -207,28 +207,4 @@ fn used_materials(scene: &Scene) -> Vec<&Material> {
         }
     }
     scene.materials.iter().zip(used).filter(|(_, used)| *used).map(|(material, _)| &**material).collect()
-}
-
-fn has_textures(m: &Material) -> bool {
-    [
-        m.base_color_texture,
-        m.metallic_roughness_texture,
-        m.normal_texture,
-        m.emissive_texture,
-        m.specular_texture,
-        m.specular_color_texture,
-        m.transmission_texture,
-        m.diffuse_transmission_texture,
-        m.diffuse_transmission_color_texture,
-        m.clearcoat_texture,
-        m.clearcoat_roughness_texture,
-        m.clearcoat_normal_texture,
-        m.sheen_color_texture,
-        m.sheen_roughness_texture,
-        m.anisotropy_texture,
-        m.iridescence_texture,
-        m.iridescence_thickness_texture,
-    ]
-    .iter()
-    .any(Option::is_some)
 }

@@ -387,6 +387,31 @@ impl Material {
         let dielectric = self.specular > 0.0 || self.transmission > 0.0 || self.iridescence > 0.0;
         self.metallic > 0.0 || dielectric
     }
+
+    /// Every texture that it refers to.
+    pub fn textures(&self) -> impl Iterator<Item = TextureRef> {
+        [
+            self.base_color_texture,
+            self.metallic_roughness_texture,
+            self.normal_texture,
+            self.emissive_texture,
+            self.specular_texture,
+            self.specular_color_texture,
+            self.transmission_texture,
+            self.diffuse_transmission_texture,
+            self.diffuse_transmission_color_texture,
+            self.clearcoat_texture,
+            self.clearcoat_roughness_texture,
+            self.clearcoat_normal_texture,
+            self.sheen_color_texture,
+            self.sheen_roughness_texture,
+            self.anisotropy_texture,
+            self.iridescence_texture,
+            self.iridescence_thickness_texture,
+        ]
+        .into_iter()
+        .flatten()
+    }
 }
 
 /// What kind of punctual light.

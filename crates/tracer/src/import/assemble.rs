@@ -9,7 +9,6 @@ use super::document::Document;
 use super::error::{ContentError, Fault};
 use super::graph::{Graph, Placement};
 use super::hash_meshes;
-use super::material;
 use super::primitive::Built;
 use super::report::{ImportReport, ImportWarning, SceneNode};
 use crate::bvh::LARGEST_COORDINATE;
@@ -158,7 +157,7 @@ fn warn_of_missing_uvs(
     for (request, material_index) in pairs {
         let Some(mesh) = &built[request].mesh else { continue };
         for set in 0..2u32 {
-            let is_used = material::texture_refs(&materials[&material_index]).any(|t| t.uv_set == set);
+            let is_used = materials[&material_index].textures().any(|t| t.uv_set == set);
             if is_used && mesh.uvs[set as usize].is_empty() {
                 let place = graph.requests[request].primitive.place.clone();
                 report.warnings.push(ImportWarning::TexCoordMissing { place, set });

@@ -281,31 +281,6 @@ fn texture_transform(o: &Object<'_>) -> Result<[[f32; 3]; 2], Fault> {
     Ok(rows.map(|row| row.map(narrow)))
 }
 
-/// Every texture reference of a material.
-pub(super) fn texture_refs(m: &Material) -> impl Iterator<Item = TextureRef> {
-    [
-        m.base_color_texture,
-        m.metallic_roughness_texture,
-        m.normal_texture,
-        m.emissive_texture,
-        m.specular_texture,
-        m.specular_color_texture,
-        m.transmission_texture,
-        m.diffuse_transmission_texture,
-        m.diffuse_transmission_color_texture,
-        m.clearcoat_texture,
-        m.clearcoat_roughness_texture,
-        m.clearcoat_normal_texture,
-        m.sheen_color_texture,
-        m.sheen_roughness_texture,
-        m.anisotropy_texture,
-        m.iridescence_texture,
-        m.iridescence_thickness_texture,
-    ]
-    .into_iter()
-    .flatten()
-}
-
 /// The texture coordinates along which a material's tangents run; `None` when it needs no tangents.
 pub(super) fn tangent_uv_set(m: &Material) -> Option<u32> {
     let texture = m.normal_texture.or(m.clearcoat_normal_texture).or(m.anisotropy_texture);
