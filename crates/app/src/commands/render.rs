@@ -397,7 +397,7 @@ mod tests {
     use super::*;
     use crate::cli::{self, Command};
 
-    fn args(line: &str) -> RenderArgs {
+    pub(super) fn args(line: &str) -> RenderArgs {
         let words = format!("fovea render -o a.exr {line}");
         match cli::parse(words.split_whitespace().map(OsString::from)).unwrap().command {
             Some(Command::Render(args)) => *args,

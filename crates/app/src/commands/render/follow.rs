@@ -153,20 +153,10 @@ fn shared_out(looked: &[(f64, GazePoint)], film: Range<u64>) -> Vec<Step> {
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
-    use std::ffi::OsString;
-
     use glam::{Quat, Vec2, Vec3};
 
     use super::*;
-    use crate::cli::{self, Command};
-
-    fn args(line: &str) -> RenderArgs {
-        let words = format!("fovea render -o a.exr {line}");
-        match cli::parse(words.split_whitespace().map(OsString::from)).unwrap().command {
-            Some(Command::Render(args)) => *args,
-            other => panic!("{other:?}"),
-        }
-    }
+    use crate::commands::render::tests::args;
 
     fn view() -> View {
         View { world_from_view: Quat::IDENTITY, half_extent: Vec2::new(1.0, 0.5) }
