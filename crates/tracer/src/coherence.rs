@@ -17,8 +17,15 @@ pub const ORDER_BITS: usize = 20;
 /// twice as many: where some of a software adapter's eight lanes have paths that go on, the others wait. It follows from a sample's
 /// number and its point alone, so that films do not depend on how the samples were cut into batches.
 pub const ROULETTE_CELL_BITS: [u32; 2] = [6, 5];
-/// Blocks are 2^this samples.
+/// Blocks are 2^this samples, where samples share.
 pub const ROULETTE_BLOCK_BITS: u32 = 15;
+
+/// Bits of a block in which samples share what roulette goes by, where the pixel that gets most samples gets `peak_share` of all; 0 where each sample has
+/// its own: with more than one sample of a block in a pixel, a pixel's samples would not be independent of each other, and its variance not what
+/// the film says.
+pub fn roulette_block_bits(peak_share: f64) -> u32 {
+    if peak_share * f64::from(1u32 << ROULETTE_BLOCK_BITS) <= 1.0 { ROULETTE_BLOCK_BITS } else { 0 }
+}
 
 /// Columns of the matrix from thread bits to index bits, for a batch of 2^`log2_size` samples.
 ///

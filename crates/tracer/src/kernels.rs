@@ -7,7 +7,7 @@ use thiserror::Error;
 use wesl::{CompileOptions, ModulePath, VirtualResolver, Wesl};
 
 use crate::{
-    coherence::{ROULETTE_BLOCK_BITS, ROULETTE_CELL_BITS},
+    coherence::ROULETTE_CELL_BITS,
     features::{Feature, SceneFeatures},
     guide::{GUIDE_COLUMNS_PER_ROW, GUIDE_POINTS},
     scene::ContentHash,
@@ -459,7 +459,6 @@ fn constants_module(c: &KernelConstants) -> String {
         ("FIRST_ROULETTE_BOUNCE", FIRST_ROULETTE_BOUNCE),
         ("ROULETTE_COLUMN_BITS", ROULETTE_CELL_BITS[0]),
         ("ROULETTE_ROW_BITS", ROULETTE_CELL_BITS[1]),
-        ("ROULETTE_BLOCK_BITS", ROULETTE_BLOCK_BITS),
         ("QUEUE_HEADER_WORDS", QUEUE_HEADER_WORDS),
         ("GUIDE_COLUMNS_PER_ROW", GUIDE_COLUMNS_PER_ROW),
         ("GUIDE_POINTS", GUIDE_POINTS),

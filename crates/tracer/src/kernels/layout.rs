@@ -100,6 +100,8 @@ shared! {
         fovea_first: u32,
         fovea_cells: u32,
         fovea_cell_bits: u32,
+        roulette_block_bits: u32,
+        pad_0: [u32; 3],
         order: [[u32; 4]; 5],
         layers: [SampleLayer; MAX_LAYERS],
     }

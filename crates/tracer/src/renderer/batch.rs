@@ -9,7 +9,7 @@ use super::{
     schedule::{PathBatch, PathKernels},
 };
 use crate::{
-    coherence::order_columns,
+    coherence::{order_columns, roulette_block_bits},
     guide::Guide,
     kernels::{
         Kernel, WORKGROUP_SIZE,
@@ -95,6 +95,8 @@ impl Renderer {
             fovea_first: sampling.fovea_first,
             fovea_cells: sampling.fovea_cells,
             fovea_cell_bits: sampling.fovea_cell_bits,
+            roulette_block_bits: roulette_block_bits(self.distribution.peak_share(&self.options.film)),
+            pad_0: [0; 3],
             order,
             layers: sampling.layers,
         })
