@@ -1,7 +1,7 @@
 //! Russian roulette whose numbers neighbours share: no bias, and pixels as noisy as the film says.
 //!
-//! In a closed room of one albedo and one emission the radiance is known, and nothing of a path counts but the bounce after which
-//! roulette ends it: what a shared number does to a pixel shows here most.
+//! In a closed room of one albedo and one emission the radiance is known, and without samples of lights nothing of a path counts but
+//! the bounce after which roulette ends it: what a shared number does to a pixel shows here most.
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use fovea_tests::{
@@ -16,7 +16,7 @@ use tracer::{
     film::FilmOptions,
     gpu::Gpu,
     kernels::ShaderSources,
-    renderer::{Renderer, RendererOptions},
+    renderer::{Renderer, RendererOptions, SamplingTechnique},
     scene::{Material, Scene},
 };
 
@@ -44,6 +44,7 @@ fn measure(gpu: &Gpu, film: FilmOptions, plant: impl Fn(&ShaderSources) -> Shade
     let options = RendererOptions { film, max_bounces: BOUNCES, ..Default::default() };
     let mut renderer = Renderer::new(gpu, &options, everywhere).unwrap();
     renderer.set_shaders(plant(renderer.shaders())).unwrap();
+    renderer.set_technique(SamplingTechnique::Bsdf).unwrap();
     renderer.set_scene(&room()).unwrap();
     let mut sums = vec![[0.0; 3]; film.pixels() as usize];
     let mut means = Vec::new();
