@@ -20,9 +20,9 @@ pub const ROULETTE_CELL_BITS: [u32; 2] = [6, 5];
 /// Blocks are 2^this samples, where samples share.
 pub const ROULETTE_BLOCK_BITS: u32 = 15;
 
-/// Bits of a block in which samples share what roulette goes by, where the pixel that gets most samples gets `peak_share` of all; 0 where each sample has
-/// its own: with more than one sample of a block in a pixel, a pixel's samples would not be independent of each other, and its variance not what
-/// the film says.
+/// Bits of a block in which samples share what roulette goes by, where the pixel that gets most samples gets `peak_share` of all;
+/// 0 where each sample has its own: with more than one sample of a block in a pixel, a pixel's samples would not be independent of
+/// each other, and its variance not what the film says.
 pub fn roulette_block_bits(peak_share: f64) -> u32 {
     if peak_share * f64::from(1u32 << ROULETTE_BLOCK_BITS) <= 1.0 { ROULETTE_BLOCK_BITS } else { 0 }
 }
@@ -63,8 +63,18 @@ pub fn order_columns(log2_size: u32) -> [u32; ORDER_BITS] {
 }
 
 #[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
+    use std::sync::Arc;
+
+    use fovea_sampler::{Angle, Geometry, Inverse, RadialDistribution, Reddy2001};
+    use glam::Vec3;
+
     use super::*;
+    use crate::{
+        distribution::{Distribution, Gaze},
+        film::FilmOptions,
+    };
 
     fn index_of_thread(columns: &[u32; ORDER_BITS], thread: u32) -> u32 {
         columns
@@ -97,6 +107,20 @@ mod tests {
             }
             assert!(sharing.values().all(|&samples| samples <= 16), "2^{k} samples: {:?}", sharing.values().max());
         }
+    }
+
+    /// The film that the window has shares in every mode; a quarter of it does not about a gaze.
+    #[test]
+    fn films_share_where_a_pixel_has_one_sample_of_a_block() {
+        let acuity = RadialDistribution::new(Reddy2001, Geometry::Sphere, Angle::from_degrees(80.0), 0.002).unwrap();
+        let inverse = Arc::new(Inverse::default_for(&acuity));
+        let everywhere = Distribution::omnidirectional(inverse.clone());
+        let foveated = Distribution::foveated(Gaze::Scene { direction: Vec3::NEG_Z }, None, inverse);
+        let bits = |distribution: &Distribution, width| {
+            roulette_block_bits(distribution.peak_share(&FilmOptions::equirect(width, width / 2)))
+        };
+        assert_eq!([bits(&everywhere, 2048), bits(&foveated, 2048)], [ROULETTE_BLOCK_BITS; 2]);
+        assert_eq!([bits(&everywhere, 1024), bits(&foveated, 1024)], [ROULETTE_BLOCK_BITS, 0]);
     }
 
     /// A permutation, and the first `2^(k-6)` parts of 64 threads each stay in a cell of their own.
