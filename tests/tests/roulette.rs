@@ -5,6 +5,7 @@
 #![expect(clippy::unwrap_used, reason = "a test may panic")]
 
 use fovea_tests::{
+    cycles::luminance,
     device,
     plant::exchanged,
     scenes::{Builder, emitter, lambert},
@@ -38,7 +39,8 @@ fn room() -> Scene {
     builder.build()
 }
 
-/// Means of the film's renders, a seed each; and the variance of the pixels over the seeds beside what the films say of it, means over the pixels.
+/// Means of the film's renders, a seed each; and the variance of the pixels over the seeds beside what the films say of it, means
+/// over the pixels.
 fn measure(gpu: &Gpu, film: FilmOptions, plant: impl Fn(&ShaderSources) -> ShaderSources) -> (Vec<f64>, f64, f64) {
     let everywhere = Distribution::omnidirectional(device::inverse());
     let options = RendererOptions { film, max_bounces: BOUNCES, ..Default::default() };
@@ -53,8 +55,7 @@ fn measure(gpu: &Gpu, film: FilmOptions, plant: impl Fn(&ShaderSources) -> Shade
         let snapshot = device::trace(&mut renderer, SAMPLES).unwrap();
         let mut sum = 0.0;
         for ([first, second, said], pixel) in sums.iter_mut().zip(snapshot.pixels()) {
-            let [r, g, b] = pixel.mean;
-            let luminance = 0.2126 * r + 0.7152 * g + 0.0722 * b;
+            let luminance = luminance(pixel.mean);
             *first += luminance;
             *second += luminance * luminance;
             *said += pixel.variance_of_mean;

@@ -109,7 +109,7 @@ mod tests {
         }
     }
 
-    /// The film that the window has shares in every mode; a quarter of it does not about a gaze.
+    /// The film that the window has shares, and what tests/tests/roulette.rs has; a quarter of it does not about a gaze.
     #[test]
     fn films_share_where_a_pixel_has_one_sample_of_a_block() {
         let acuity = RadialDistribution::new(Reddy2001, Geometry::Sphere, Angle::from_degrees(80.0), 0.002).unwrap();
@@ -120,6 +120,7 @@ mod tests {
             roulette_block_bits(distribution.peak_share(&FilmOptions::equirect(width, width / 2)))
         };
         assert_eq!([bits(&everywhere, 2048), bits(&foveated, 2048)], [ROULETTE_BLOCK_BITS; 2]);
+        assert_eq!(bits(&everywhere, 256), ROULETTE_BLOCK_BITS);
         assert_eq!([bits(&everywhere, 1024), bits(&foveated, 1024)], [ROULETTE_BLOCK_BITS, 0]);
     }
 
